@@ -154,3 +154,64 @@ fn a_restored_world_weighs_what_it_did() {
     scene::frames(&mut app, 3);
     assert!(near(reads(&app), [1.0, 0.0]), "{:?}", reads(&app));
 }
+
+/// Two marbles that hit each other change their momentum by the impulses on them, whoever is asked.
+#[test]
+fn each_of_two_has_its_impulse_with_its_sign() {
+    #[derive(Resource, Default)]
+    struct Told(Vec<(ContactPair, [Vec3; 3])>);
+    for response in [Response::SoftStep, Response::Impulse, Response::EventDriven] {
+        let mut app = scene::app();
+        *app.world_mut().resource_mut::<TawModel>() = TawModel(Model { response, ..Model::GAME });
+        app.insert_resource(Gravity(Vec3::ZERO)).init_resource::<Told>();
+        let marbles = [-1.0, 1.0].map(|x| {
+            let marble = scene::drop_marble(&mut app, 0.5, Vec3::X * 1.03 * x);
+            let towards = (MarbleMass::Kilograms(2.0 + x), Velocity(Vec3::NEG_X * 4.0 * x));
+            app.world_mut().entity_mut(marble).insert(towards);
+            marble
+        });
+        let nobody = app.world_mut().spawn_empty().id();
+        app.add_observer(move |hit: On<ContactHit>, mut told: ResMut<Told>| {
+            told.0.push((hit.pair, [marbles[0], marbles[1], nobody].map(|it| hit.impulse_on(it))));
+        });
+        app.add_observer(move |start: On<ContactStarted>, mut told: ResMut<Told>| {
+            let impulses = [marbles[0], marbles[1], nobody].map(|it| start.impulse_on(it));
+            told.0.push((start.pair, impulses));
+        });
+        scene::frames(&mut app, 30);
+        let momentum = |i: usize| {
+            let x = [-1.0, 1.0][i];
+            let velocity = **app.world().get::<Velocity>(marbles[i]).unwrap();
+            (velocity - Vec3::NEG_X * 4.0 * x) * (2.0 + x)
+        };
+        let changes = [momentum(0), momentum(1)];
+        assert!(changes[0].x < -1.0 && changes[1].x > 1.0, "{response:?}: {changes:?}");
+        let told = &app.world().resource::<Told>().0;
+        assert_eq!(told.len(), 4, "{response:?}: {told:#?}");
+        for (pair, [a, b, other]) in told {
+            assert!(pair.other(marbles[0]) == Some(marbles[1]));
+            assert!((a - changes[0]).length() < 1e-3, "{response:?}: {a} {changes:?}");
+            assert!((b - changes[1]).length() < 1e-3, "{response:?}: {b} {changes:?}");
+            assert_eq!(*other, Vec3::ZERO);
+        }
+    }
+}
+
+/// A contact that goes on pushes the floor down by the weight, and the marble up.
+#[test]
+fn each_of_two_has_its_force_with_its_sign() {
+    #[derive(Resource, Default)]
+    struct Told([Vec3; 2]);
+    let mut app = scene::app();
+    app.insert_resource(TawModel::default()).init_resource::<Told>();
+    let floor = scene::floor(&mut app);
+    let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.5);
+    app.world_mut().entity_mut(marble).insert(SleepingDisabled);
+    app.add_observer(move |goes: On<ContactOngoing>, mut told: ResMut<Told>| {
+        told.0 = [floor, marble].map(|it| goes.force_on(it));
+    });
+    scene::frames(&mut app, 60);
+    let [on_floor, on_marble] = app.world().resource::<Told>().0;
+    assert_eq!(on_floor, -on_marble);
+    assert!((on_marble.y / weight(&app, marble) - 1.0).abs() < 0.01, "{on_marble}");
+}

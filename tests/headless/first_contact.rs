@@ -100,6 +100,39 @@ fn components_that_the_model_ignores_are_named() {
 }
 
 #[test]
+fn forces_that_the_response_does_not_know_and_sleep_that_nobody_has_are_named() {
+    let mut app = app();
+    let floor = scene::floor(&mut app);
+    app.world_mut().entity_mut(floor).insert(ContactForce::default());
+    let marble = scene::drop_marble(&mut app, 0.1, Vec3::Y);
+    app.world_mut().entity_mut(marble).insert(SleepingDisabled);
+    let mut ignored = |response: Response, sleeps: bool| {
+        app.insert_resource(TawModel(Model { response, ..Model::GAME }));
+        app.insert_resource(TawSwarmModel(SwarmModel { sleeps, ..SwarmModel::default() }));
+        scene::frames(&mut app, 2);
+        app.world().resource::<IgnoredComponents>().to_vec()
+    };
+    assert_eq!(ignored(Response::SoftStep, true), [""; 0]);
+    assert_eq!(ignored(Response::Impulse, true), [""; 0]);
+    let law = ContactLaw::HertzMindlin;
+    assert_eq!(ignored(Response::Penalty(law), false), ["SleepingDisabled"]);
+    assert_eq!(ignored(Response::Displacement, true), ["ContactForce"]);
+    assert_eq!(ignored(Response::EventDriven, true), ["ContactForce of what rests"]);
+    // Those of marbles on walls.
+    let of_marbles = (
+        Grounded::default(),
+        IgnoreCollisions::default(),
+        ColliderDisabled::default(),
+        SleepingDisabled,
+    );
+    app.world_mut().entity_mut(floor).remove::<ContactForce>().insert(of_marbles);
+    scene::frames(&mut app, 2);
+    let expected = ["Grounded", "IgnoreCollisions", "ColliderDisabled", "SleepingDisabled"];
+    let found = app.world().resource::<IgnoredComponents>().to_vec();
+    assert_eq!(found, expected.map(|name| format!("{name} of a wall")));
+}
+
+#[test]
 fn settings_that_the_response_ignores_are_named() {
     let mut app = app();
     let mut ignored = |model: Model| {

@@ -1,6 +1,7 @@
 //! Whole scenes in Bevy apps without a window: `MinimalPlugins`, `TawPlugins`, and
 //! a clock that the test turns.
 
+mod balls;
 mod board;
 mod capsules;
 mod contact_forces;
@@ -18,8 +19,11 @@ mod mesh_walls;
 mod motion;
 mod moving_walls;
 mod nasty;
+mod panels;
 mod picking;
+mod previews;
 mod queries;
+mod reflection;
 mod scene;
 mod schedules;
 mod sensors;

@@ -10,8 +10,9 @@ use taw::response::Response;
 use crate::SubstepDelta;
 use crate::components::MarbleState;
 use crate::convert::from_vector;
-use crate::messages::{self, ContactPair};
+use crate::messages::ContactPair;
 use crate::resources::TawWorld;
+use crate::touches;
 
 /// Force that contacts exert on a wall or a marble, in N: add it to those of which you want to know it, a
 /// button or a scale. Updated after each step; what sleeps keeps its force.
@@ -71,7 +72,7 @@ pub(crate) fn impulse_of(world: &TawWorld, pair: ContactPair) -> Vec3 {
 
 /// Run condition: somebody reads impulses of contacts.
 pub(crate) fn are_read(world: &World, forces: Query<(), With<ContactForce>>) -> bool {
-    !forces.is_empty() || messages::are_read(world)
+    !forces.is_empty() || touches::are_read(world)
 }
 
 /// Lets the next step record impulses, if somebody reads them.

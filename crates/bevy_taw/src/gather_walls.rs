@@ -129,6 +129,7 @@ pub fn walls(
     *frame =
         FrameTime { this: frame.this, since_step: 0.0, first: false, gathered_at: fixed.elapsed() };
     let (mut rows, mut sensors) = (0, 0);
+    world.moving_walls.clear();
     for mut item in &mut walls {
         let entity = item.0.0;
         let change = if is_marked(&teleports, &parents, entity) {
@@ -316,6 +317,7 @@ impl Gathering<'_, '_> {
         });
         let set = self.set_motion(state, motion);
         self.refusals.check(Some(entity), set);
+        self.world.moving_walls.extend(state.id.filter(|_| velocity.is_some()));
         if state.posed == Some(seen) && !self.all {
             return;
         }

@@ -1,4 +1,4 @@
-//! The physics, drawn: contacts, normals, velocities, sensors and the grid.
+//! The physics, drawn: contacts, normals, velocities, walls, sensors, sleepers and the grid.
 //!
 //! All of it is in one [`GizmoConfigGroup`], [`TawGizmos`], and off until switched
 //! on there.
@@ -23,7 +23,11 @@ pub struct TawGizmos {
     pub normals: bool,
     /// Velocities times [`TawGizmos::velocity_scale`].
     pub velocities: bool,
-    /// The outlines of sensors, in another color while a marble is inside. Of a half-space, a part of its
+    /// The outlines of walls as the physics has them, seen or unseen. Of a half-space, a part of its surface.
+    pub walls: bool,
+    /// A sphere around each marble that sleeps.
+    pub sleepers: bool,
+    /// The outlines of sensors, in another color while a marble or ball is inside. Of a half-space, a part of its
     /// surface.
     pub sensors: bool,
     /// The occupied cells of the grid's coarsest level.
@@ -40,6 +44,8 @@ impl Default for TawGizmos {
             contacts: false,
             normals: false,
             velocities: false,
+            walls: false,
+            sleepers: false,
             sensors: false,
             grid: false,
             normal_length: 0.5,
@@ -89,6 +95,12 @@ fn draw(world: Res<TawWorld>, places: Query<&GlobalTransform>, mut gizmos: Gizmo
             let end = position + from_vector(*velocity) * config.velocity_scale;
             gizmos.arrow(position, end, tailwind::SKY_300);
         }
+    }
+    if config.walls {
+        outline::walls(&world, &places, &mut gizmos);
+    }
+    if config.sleepers {
+        outline::sleepers(&world, &mut gizmos);
     }
     if config.sensors {
         outline::sensors(&world, &places, &mut gizmos);

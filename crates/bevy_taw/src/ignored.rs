@@ -10,11 +10,13 @@ use taw::world::{Detection, Model, Precision};
 
 use crate::components::{
     AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
-    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, SurfaceMaterial, SurfaceVelocity,
-    Velocity,
+    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, SleepingDisabled, SurfaceMaterial,
+    SurfaceVelocity, Velocity,
 };
+use crate::contact_force::ContactForce;
 use crate::controller::MarbleController;
-use crate::ignore::OneWay;
+use crate::grounded::Grounded;
+use crate::ignore::{ColliderDisabled, IgnoreCollisions, OneWay};
 use crate::resources::TawWorld;
 use crate::sensor::Sensor;
 use crate::wall::Wall;
@@ -22,7 +24,9 @@ use crate::wall::Wall;
 /// Names of the components and settings that have no effect:
 ///
 /// - components that the [`TawModel`](crate::resources::TawModel) does not read, as `SurfaceMaterial` with
-///   `Displacement` (a `MarbleMass` that contacts do not read counts for forces still);
+///   `Displacement` (a `MarbleMass` that contacts do not read counts for forces still); a `ContactForce`
+///   that the response does not write, by `EventDriven` that of what rests; a `SleepingDisabled` where
+///   nothing sleeps ([`SwarmModel::sleeps`](taw::swarm::SwarmModel::sleeps));
 /// - `integrator`, `precision` and `detection` of the model where its response does not read them; an
 ///   integrator by `SoftStep` where no [`Forces`](crate::resources::Forces) act. (Its
 ///   `iterations` are not named: every model has some.)
@@ -81,23 +85,28 @@ impl<'a> Carriers<'a> {
         self.id::<C>().is_some_and(|id| of.iter().any(|archetype| archetype.contains(id)))
     }
 
-    /// Each name of what the model may not read, and true if it does not.
-    fn of_model(&self, model: Model, has_forces: bool) -> [(&'static str, bool); 9] {
+    /// Each name of what the model may not read or write, and true if it does not.
+    fn of_model(&self, model: Model, has_forces: bool, sleeps: bool) -> [(&'static str, bool); 12] {
         let Model { integrator, response, rotation, precision, detection, .. } = model;
         let projects = response == Response::Displacement;
         let unturned = rotation == Rotation::None;
         let soft = response == Response::SoftStep;
         let is_parabola = soft && !has_forces; // whatever the integrator
-        let is_continuous = soft || response == Response::EventDriven;
+        let event_driven = response == Response::EventDriven;
+        let is_continuous = soft || event_driven;
         let (marbles, walls) = (&self.marbles, &self.walls);
         let has_material =
             self.any::<SurfaceMaterial>(marbles) || self.any::<SurfaceMaterial>(walls);
+        let has_force = self.any::<ContactForce>(marbles) || self.any::<ContactForce>(walls);
         [
             ("SurfaceMaterial", projects && has_material),
             ("SurfaceVelocity", projects && self.any::<SurfaceVelocity>(walls)),
             ("MarbleMass", projects && self.any::<MarbleMass>(marbles)),
             ("AngularVelocity", unturned && self.any::<AngularVelocity>(marbles)),
             ("MarbleRotation", unturned && self.any::<MarbleRotation>(marbles)),
+            ("ContactForce", projects && has_force),
+            ("ContactForce of what rests", event_driven && has_force),
+            ("SleepingDisabled", !sleeps && self.any::<SleepingDisabled>(marbles)),
             ("MarbleIntegrator", is_parabola && self.any::<MarbleIntegrator>(marbles)),
             ("Model::integrator", is_parabola && integrator != Integrator::SemiImplicitEuler),
             ("Model::precision", soft && precision != Precision::Plain),
@@ -106,7 +115,7 @@ impl<'a> Carriers<'a> {
     }
 
     /// Each name of a component that has no effect where it is, and true if an entity has it there.
-    fn of_places(&self) -> [(&'static str, bool); 15] {
+    fn of_places(&self) -> [(&'static str, bool); 19] {
         let (marbles, walls) = (&self.marbles, &self.walls);
         [
             ("Velocity of a wall", self.any::<Velocity>(walls)),
@@ -120,6 +129,10 @@ impl<'a> Carriers<'a> {
             ("MarbleIntegrator of a wall", self.any::<MarbleIntegrator>(walls)),
             ("MarbleRotation of a wall", self.any::<MarbleRotation>(walls)),
             ("MarbleController of a wall", self.any::<MarbleController>(walls)),
+            ("Grounded of a wall", self.any::<Grounded>(walls)),
+            ("IgnoreCollisions of a wall", self.any::<IgnoreCollisions>(walls)),
+            ("ColliderDisabled of a wall", self.any::<ColliderDisabled>(walls)),
+            ("SleepingDisabled of a wall", self.any::<SleepingDisabled>(walls)),
             ("SurfaceVelocity of a marble", self.any::<SurfaceVelocity>(marbles)),
             ("OneWay of a marble", self.any::<OneWay>(marbles)),
             ("Sensor of a marble", self.any::<Sensor>(marbles)),
@@ -152,7 +165,8 @@ pub(crate) fn find(
     let without_effect = |rows: &[(&'static str, bool)]| -> Vec<&'static str> {
         rows.iter().filter(|(_, is_ignored)| *is_ignored).map(|(name, _)| *name).collect()
     };
-    let mut ignored = without_effect(&carriers.of_model(model, !world.forces().is_empty()));
+    let (has_forces, sleeps) = (!world.forces().is_empty(), world.swarm.model().sleeps);
+    let mut ignored = without_effect(&carriers.of_model(model, has_forces, sleeps));
     let Model { response, rotation, .. } = model;
     for name in ignored.iter().filter(|name| !found.contains(name)) {
         log::warn!(

@@ -41,12 +41,13 @@
 //! | [`resources`] | the model, gravity, the world |
 //! | [`swarm`] | marbles in bulk that are no entities |
 //! | [`messages`] | contacts that start, go on and end |
-//! | [`sensor`] | shapes that report which marbles enter and leave |
+//! | [`sensor`] | shapes that report which marbles and balls enter and leave |
 //! | [`grounded`] | the ground under marbles |
 //! | [`controller`] | marbles that a player rolls |
 //! | [`zones`] | gravity and wind of their own in places |
-//! | [`spatial_query`] | rays, shapes and points among marbles and walls |
+//! | [`spatial_query`] | rays, shapes and points among marbles, walls and balls of swarms |
 //! | [`snapshot`] | back in time, and rows without entities |
+//! | [`preview`] | paths that marbles would take, and shots |
 //! | [`ignore`] | marbles that pass through others, one-way walls |
 //! | [`ignored`] | components that the model does not read |
 //! | [`refusal`] | input that was refused, marbles that had to be stopped |
@@ -100,6 +101,7 @@
 #![cfg_attr(not(test), warn(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod ball;
+mod ball_sensor;
 pub mod components;
 pub mod contact_force;
 pub mod controller;
@@ -128,6 +130,7 @@ mod outline;
 #[cfg(feature = "picking")]
 pub mod picking;
 mod plugin;
+pub mod preview;
 mod reflect;
 pub mod refusal;
 pub mod resources;
@@ -140,6 +143,7 @@ pub mod spatial_query;
 pub mod swarm;
 #[cfg(feature = "render")]
 pub mod swarm_render;
+mod touches;
 #[cfg(feature = "trade")]
 pub mod trade;
 pub mod wall;
@@ -173,9 +177,12 @@ pub mod prelude {
     };
     #[cfg(feature = "picking")]
     pub use crate::picking::TawPickingPlugin;
+    pub use crate::preview::Preview;
     pub use crate::refusal::{InputRefused, MarbleStopped, Refusal};
     pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};
-    pub use crate::sensor::{CollidingBalls, CollidingEntities, Sensor, SensorEntered, SensorLeft};
+    pub use crate::sensor::{
+        BallEntered, BallLeft, CollidingBalls, CollidingEntities, Sensor, SensorEntered, SensorLeft,
+    };
     pub use crate::spatial_query::{SpatialQuery, SpatialQueryFilter};
     pub use crate::swarm::{Ball, BallId, Swarm, TawSwarmModel, Tint};
     pub use crate::wall::Wall;

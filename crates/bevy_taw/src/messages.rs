@@ -23,25 +23,7 @@
 //! ```
 
 use bevy::ecs::event::EntityTrigger;
-use bevy::ecs::message::Messages;
-use bevy::ecs::observer::CachedObservers;
 use bevy::prelude::*;
-use taw::contact::Contact;
-use taw::math::{Vec3 as TawVec3, length};
-use taw::response::Response;
-
-use crate::SubstepDelta;
-use crate::components::{MarbleState, WallState};
-use crate::contact_force::{impulse_of, step_of};
-use crate::convert::{from_point, from_vector};
-use crate::gap::{fall, gap};
-use crate::resources::TawWorld;
-
-/// Slowest hit, in m/s.
-const SLOWEST_HIT: f32 = 1e-3;
-
-/// Cosine of the angle up to which two normals are one direction: 18 degrees.
-const ONE_DIRECTION: f32 = 0.95;
 
 /// Two entities that touch. In an observer, `a` is the entity that is observed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Reflect)]
@@ -61,6 +43,15 @@ impl ContactPair {
             _ if entity == self.a => Some(self.b),
             _ if entity == self.b => Some(self.a),
             _ => None,
+        }
+    }
+
+    /// Part of a vector on `b` that acts on an entity.
+    fn on(&self, entity: Entity, on_b: Vec3) -> Vec3 {
+        match entity {
+            _ if entity == self.b => on_b,
+            _ if entity == self.a => -on_b,
+            _ => Vec3::ZERO,
         }
     }
 }
@@ -88,8 +79,15 @@ pub struct ContactStarted {
 }
 
 impl ContactStarted {
+    /// Impulse on one of the two, in N s: [`impulse`](Self::impulse) on `b`, which the normal points to, the
+    /// opposite on `a`, and zero on any other entity.
+    #[must_use]
+    pub fn impulse_on(&self, entity: Entity) -> Vec3 {
+        self.pair.on(entity, self.impulse)
+    }
+
     /// Contact that goes on, of which nobody reads more than the pair.
-    fn going_on(pair: ContactPair) -> Self {
+    pub(crate) fn going_on(pair: ContactPair) -> Self {
         let zero = Vec3::ZERO;
         let (part, approach_speed, slip_speed) = (0, 0.0, 0.0);
         Self { pair, normal: zero, point: zero, part, approach_speed, slip_speed, impulse: zero }
@@ -99,10 +97,50 @@ impl ContactStarted {
 /// Impact of two entities, faster than a resting contact, whether or not they touched before: a marble
 /// that runs along a mesh hits the end of it. Good for sounds and sparks.
 ///
-/// Sent above 1 mm/s and, except by [`EventDriven`](Response::EventDriven), above what gravity makes in two
+/// Sent above 1 mm/s and, except by [`EventDriven`](taw::response::Response::EventDriven), above what gravity makes in two
 /// substeps. A pair that touches in several places has a hit for each of them; of those in one
 /// direction, within a step, the fastest. Within a step they come in the order of time by `EventDriven`, else in any
 /// order.
+///
+/// A wall that breaks:
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy::time::TimeUpdateStrategy;
+/// # use bevy_taw::prelude::*;
+/// /// Impulse in N s that breaks it.
+/// #[derive(Component)]
+/// struct Brittle(f32);
+///
+/// /// Sees the wall as `pair.a`, since it is the wall that is observed.
+/// fn crack(hit: On<ContactHit>, walls: Query<&Brittle>, mut commands: Commands) -> Result {
+///     let wall = hit.pair.a;
+///     if hit.impulse_on(wall).length() > walls.get(wall)?.0 {
+///         commands.entity(wall).try_despawn(); // two may hit it in one step
+///     }
+///     Ok(())
+/// }
+///
+/// fn spawn(mut commands: Commands) {
+///     let pane = Wall::from(Cuboid::new(0.1, 2.0, 2.0));
+///     commands.spawn((pane, Brittle(20.0))).observe(crack);
+///     // A kilogram at 2 m/s bounces off, one at 30 m/s does not. (It comes second.)
+///     for (x, speed) in [(-1.0, 2.0), (-40.0, 30.0)] {
+///         let at = Transform::from_xyz(x, 0.0, 0.0);
+///         let mass = MarbleMass::Kilograms(1.0);
+///         commands.spawn((Marble::new(0.3), mass, Velocity(Vec3::X * speed), at));
+///     }
+/// }
+/// # let mut app = App::new();
+/// # app.add_plugins((MinimalPlugins, TransformPlugin, TawPlugin)).insert_resource(Gravity(Vec3::ZERO));
+/// # let step = app.world().resource::<Time<Fixed>>().timestep();
+/// # app.insert_resource(TimeUpdateStrategy::ManualDuration(step)).add_systems(Startup, spawn);
+/// # let walls = |app: &mut App| app.world_mut().query::<&Wall>().iter(app.world()).count();
+/// # (0..64).for_each(|_| app.update());
+/// # assert_eq!(walls(&mut app), 1);
+/// # (0..64).for_each(|_| app.update());
+/// # assert_eq!(walls(&mut app), 0);
+/// ```
 #[derive(Message, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct ContactHit {
@@ -123,6 +161,15 @@ pub struct ContactHit {
     pub impulse: Vec3,
 }
 
+impl ContactHit {
+    /// Impulse on one of the two, in N s: [`impulse`](Self::impulse) on `b`, which the normal points to, the
+    /// opposite on `a`, and zero on any other entity.
+    #[must_use]
+    pub fn impulse_on(&self, entity: Entity) -> Vec3 {
+        self.pair.on(entity, self.impulse)
+    }
+}
+
 /// Two that touched in the last step still do.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
@@ -132,6 +179,15 @@ pub struct ContactOngoing {
     /// Mean force of all contacts of the pair in the step, on `b`, in N; what sleeps keeps it. See
     /// [`ContactForce`](crate::prelude::ContactForce) for when it is known.
     pub force: Vec3,
+}
+
+impl ContactOngoing {
+    /// Force on one of the two, in N: [`force`](Self::force) on `b`, the opposite on `a`, and zero on any
+    /// other entity.
+    #[must_use]
+    pub fn force_on(&self, entity: Entity) -> Vec3 {
+        self.pair.on(entity, self.force)
+    }
 }
 
 /// Two that touched in the last step no longer do. One of them may be gone, or pass through the other.
@@ -147,7 +203,9 @@ pub struct ContactEnded {
 }
 
 /// Contact event of two entities, as one of them sees it.
-trait ContactEvent: EntityEvent + for<'a> Event<Trigger<'a> = EntityTrigger> + Copy {
+pub(crate) trait ContactEvent:
+    EntityEvent + for<'a> Event<Trigger<'a> = EntityTrigger> + Copy
+{
     /// The event as the other one sees it.
     fn swapped(self) -> Self;
 }
@@ -198,281 +256,3 @@ macro_rules! entity_event {
     )*};
 }
 entity_event!(ContactStarted, ContactHit, ContactOngoing, ContactEnded);
-
-/// Contacts of this step and of the last.
-#[derive(Resource, Default)]
-pub(crate) struct Touches {
-    /// In the order found, several to a pair if there are substeps.
-    now: Vec<ContactStarted>,
-    /// Sorted, one to a pair.
-    before: Vec<ContactPair>,
-    /// Hits in the order found.
-    hits: Vec<ContactHit>,
-    /// Number of this step's impacts already noted.
-    impacts: usize,
-    /// Events of this step for observers.
-    events: Events,
-}
-
-/// Events of a step, by kind.
-#[derive(Default)]
-struct Events {
-    started: Vec<ContactStarted>,
-    hits: Vec<ContactHit>,
-    ongoing: Vec<ContactOngoing>,
-    ended: Vec<ContactEnded>,
-}
-
-type Readers<'w> = (
-    Option<ResMut<'w, Messages<ContactStarted>>>,
-    Option<ResMut<'w, Messages<ContactHit>>>,
-    Option<ResMut<'w, Messages<ContactOngoing>>>,
-    Option<ResMut<'w, Messages<ContactEnded>>>,
-);
-
-/// Run condition: somebody reads or observes contacts.
-pub(crate) fn are_read(world: &World) -> bool {
-    is_read::<ContactStarted>(world)
-        || is_read::<ContactHit>(world)
-        || is_read::<ContactOngoing>(world)
-        || is_read::<ContactEnded>(world)
-        || are_observed(world)
-}
-
-fn is_read<M: Message>(world: &World) -> bool {
-    world.contains_resource::<Messages<M>>()
-}
-
-/// Run condition: somebody observes contacts.
-pub(crate) fn are_observed(world: &World) -> bool {
-    observers::<ContactStarted>(world).is_some()
-        || observers::<ContactHit>(world).is_some()
-        || observers::<ContactOngoing>(world).is_some()
-        || observers::<ContactEnded>(world).is_some()
-}
-
-/// Observers of an event, if there are any.
-fn observers<E: Event>(world: &World) -> Option<&CachedObservers> {
-    let observers = world.observers().try_get_observers(world.event_key::<E>()?)?;
-    let nobody = observers.global_observers().is_empty() && observers.entity_observers().is_empty();
-    (!nobody).then_some(observers)
-}
-
-/// Triggers this step's events where they are observed.
-pub(crate) fn trigger(world: &mut World) {
-    let mut events = std::mem::take(&mut world.resource_mut::<Touches>().events);
-    trigger_observed(world, &mut events.started);
-    trigger_observed(world, &mut events.hits);
-    trigger_observed(world, &mut events.ongoing);
-    trigger_observed(world, &mut events.ended);
-    world.resource_mut::<Touches>().events = events; // for their memory
-}
-
-fn trigger_observed<E: ContactEvent>(world: &mut World, events: &mut Vec<E>) {
-    for event in events.drain(..).flat_map(|event| [event, event.swapped()]) {
-        let is_observed = observers::<E>(world).is_some_and(|observers| {
-            !observers.global_observers().is_empty()
-                || observers.entity_observers().contains_key(&event.event_target())
-        });
-        if is_observed {
-            world.trigger(event);
-        }
-    }
-}
-
-impl Touches {
-    /// Notes a touch, and a hit if it is faster than `slowest`, in m/s.
-    fn add(&mut self, touch: ContactStarted, slowest: f32) {
-        let ContactStarted { pair, normal, point, part, approach_speed, slip_speed, impulse } =
-            touch;
-        if approach_speed > slowest.max(SLOWEST_HIT) {
-            let hit = ContactHit { pair, normal, point, part, approach_speed, slip_speed, impulse };
-            self.hits.push(hit);
-        }
-        self.now.push(touch);
-    }
-}
-
-impl Events {
-    fn clear(&mut self) {
-        self.started.clear();
-        self.hits.clear();
-        self.ongoing.clear();
-        self.ended.clear();
-    }
-}
-
-/// Forgets contacts while nobody reads or observes them: who listens later hears of those that start
-/// then.
-pub(crate) fn forget(mut touches: ResMut<Touches>) {
-    touches.now.clear();
-    touches.hits.clear();
-    touches.before.clear();
-    touches.impacts = 0;
-    touches.events.clear();
-}
-
-/// Notes who touches in this substep, before anything is restituted.
-pub(crate) fn collect(
-    world: Res<TawWorld>,
-    delta: Res<SubstepDelta>,
-    mut touches: ResMut<Touches>,
-) {
-    let event_driven = world.model().response == Response::EventDriven;
-    // It lists who may rest on each other, and impacts of its own.
-    let slowest = if event_driven { f32::INFINITY } else { fastest_rest(&world, delta.0) };
-    let velocity = |row: u32| world.marbles.velocity()[row as usize];
-    let point_of =
-        |contact: &Contact<f32>| world.marbles.position()[contact.b as usize] + contact.arms[1];
-    let spin = |row: u32| world.marbles.angular_velocity().get(row as usize).copied();
-    let turning = |row: u32, arm: TawVec3<f32>| {
-        spin(row).map_or(Vec3::ZERO, |spin| from_vector(spin).cross(from_vector(arm)))
-    };
-    let started = |pair: ContactPair, contact: &Contact<f32>, closing: TawVec3<f32>, on_wall| {
-        let (normal, point) = (from_vector(contact.normal), from_point(point_of(contact)));
-        let closing = from_vector(closing);
-        let first = if on_wall { Vec3::ZERO } else { turning(contact.a, contact.arms[0]) };
-        let relative = closing + turning(contact.b, contact.arms[1]) - first;
-        ContactStarted {
-            pair,
-            normal,
-            point,
-            part: contact.part,
-            approach_speed: -closing.dot(normal),
-            slip_speed: relative.reject_from_normalized(normal).length(),
-            impulse: Vec3::ZERO, // not solved yet
-        }
-    };
-    let wall_velocity = |contact: &Contact<f32>| {
-        let (row, normal) = (contact.a as usize, contact.normal);
-        world.walls.surface_velocity_of_row(row, point_of(contact), normal)
-    };
-    for contact in world.contacts.wm.iter().filter(|contact| contact.is_touching()) {
-        if let (Some(a), Some(b)) = (world.wall_entity(contact.a), world.marble_entity(contact.b)) {
-            let closing = velocity(contact.b) - wall_velocity(contact);
-            touches.add(started(ContactPair { a, b }, contact, closing, true), slowest);
-        }
-    }
-    for contact in world.contacts.mm.iter().filter(|contact| contact.is_touching()) {
-        if let (Some(a), Some(b)) = (world.marble_entity(contact.a), world.marble_entity(contact.b))
-        {
-            let closing = velocity(contact.b) - velocity(contact.a);
-            let touch = started(ContactPair { a, b }, contact, closing, false);
-            // Rows move about; the order of entities does not.
-            touches.add(if b < a { touch.swapped() } else { touch }, slowest);
-        }
-    }
-}
-
-/// Notes the collisions that the response went through by itself.
-pub(crate) fn collect_impacts(
-    world: Res<TawWorld>,
-    delta: Res<SubstepDelta>,
-    mut touches: ResMut<Touches>,
-) {
-    let model = world.model();
-    let slowest = match model.response {
-        Response::EventDriven => 0.0, // what rests has no impacts
-        _ => fastest_rest(&world, delta.0 * model.passes() as f32 / model.substeps as f32),
-    };
-    // The list grows from substep to substep.
-    for impact in world.impacts().iter().skip(touches.impacts) {
-        let first = if impact.on_wall { TawWorld::wall_entity } else { TawWorld::marble_entity };
-        let (Some(a), Some(b)) = (first(&world, impact.a), world.marble_entity(impact.b)) else {
-            continue;
-        };
-        let touch = ContactStarted {
-            pair: ContactPair { a, b },
-            normal: from_vector(impact.normal),
-            point: from_point(impact.point),
-            part: impact.part,
-            approach_speed: impact.approach_speed,
-            slip_speed: length(impact.slip),
-            impulse: from_vector(impact.impulse),
-        };
-        touches.add(if !impact.on_wall && b < a { touch.swapped() } else { touch }, slowest);
-    }
-    touches.impacts = world.impacts().len();
-}
-
-/// Compares this step's contacts with the last one's.
-pub(crate) fn write(
-    mut touches: ResMut<Touches>,
-    mut readers: Readers,
-    world: Res<TawWorld>,
-    delta: Res<SubstepDelta>,
-    marbles: Query<&MarbleState>,
-    walls: Query<&WallState>,
-) {
-    let Touches { now, hits: found, before, impacts, events } = &mut *touches;
-    *impacts = 0;
-    events.clear(); // nobody observed those of the last step
-    let fall = fall(&world, delta.0);
-    let (started, hits, ongoing, ended) = &mut readers;
-    events.hits.append(found);
-    keep_fastest(&mut events.hits);
-    for hit in events.hits.iter_mut().filter(|hit| hit.impulse == Vec3::ZERO) {
-        hit.impulse = impulse_of(&world, hit.pair);
-    }
-    if let Some(messages) = hits {
-        messages.write_batch(events.hits.iter().copied());
-    }
-    now.extend(before.iter().filter_map(|&pair| {
-        let gap = gap(pair, &world, &marbles, &walls)?;
-        gap.is_closed(fall).then_some(ContactStarted::going_on(pair))
-    }));
-    let per_second = 1.0 / step_of(&world, delta.0);
-    // Stable, so that the first substep's touch stands for its pair.
-    now.sort_by_key(|touch| touch.pair);
-    now.dedup_by_key(|touch| touch.pair);
-    let mut last = before.iter().copied().peekable();
-    for touch in now.iter() {
-        while let Some(pair) = last.next_if(|pair| *pair < touch.pair) {
-            tell(ended, &mut events.ended, ContactEnded { pair });
-        }
-        if last.next_if_eq(&touch.pair).is_some() {
-            let (pair, force) = (touch.pair, impulse_of(&world, touch.pair) * per_second);
-            tell(ongoing, &mut events.ongoing, ContactOngoing { pair, force });
-        } else {
-            let impulse = impulse_of(&world, touch.pair);
-            tell(started, &mut events.started, ContactStarted { impulse, ..*touch });
-        }
-    }
-    last.for_each(|pair| tell(ended, &mut events.ended, ContactEnded { pair }));
-    before.clear();
-    before.extend(now.drain(..).map(|touch| touch.pair));
-}
-
-/// Keeps the fastest hit of each pair and direction, in the order found.
-fn keep_fastest(hits: &mut Vec<ContactHit>) {
-    let mut sorted: Vec<_> = hits.drain(..).enumerate().collect();
-    sorted.sort_by(|(_, x), (_, y)| {
-        x.pair.cmp(&y.pair).then(y.approach_speed.total_cmp(&x.approach_speed))
-    });
-    let mut kept: Vec<(usize, ContactHit)> = Vec::with_capacity(sorted.len());
-    for (at, hit) in sorted {
-        let mut of_pair = kept.iter().rev().take_while(|(_, it)| it.pair == hit.pair);
-        if !of_pair.any(|(_, it)| it.normal.dot(hit.normal) > ONE_DIRECTION) {
-            kept.push((at, hit));
-        }
-    }
-    kept.sort_by_key(|(at, _)| *at);
-    hits.extend(kept.into_iter().map(|(_, hit)| hit));
-}
-
-/// Speed that gravity makes in two times `dt` seconds, in m/s: the largest approach speed of resting contacts.
-fn fastest_rest(world: &TawWorld, dt: f32) -> f32 {
-    2.0 * from_vector(world.gravity()).length() * dt
-}
-
-/// Writes a message, and keeps it for observers.
-fn tell<M: Message + Copy>(
-    reader: &mut Option<ResMut<Messages<M>>>,
-    events: &mut Vec<M>,
-    message: M,
-) {
-    events.push(message);
-    if let Some(messages) = reader {
-        messages.write(message);
-    }
-}

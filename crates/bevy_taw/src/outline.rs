@@ -1,4 +1,4 @@
-//! Outlines of sensors.
+//! Outlines of walls, sensors and sleepers.
 
 use bevy::color::palettes::tailwind;
 use bevy::gizmos::gizmos::GizmoBuffer;
@@ -11,10 +11,14 @@ use crate::convert::{from_point, from_rotation, from_vector, to_point};
 use crate::gizmos::TawGizmos;
 use crate::resources::TawWorld;
 
-/// Sensors without a marble inside.
+/// Sensors without a marble or ball inside.
 const EMPTY: Srgba = tailwind::VIOLET_300;
 /// Sensors with one.
 const OCCUPIED: Srgba = tailwind::LIME_400;
+/// Walls.
+const WALL: Srgba = tailwind::TEAL_300;
+/// Marbles that sleep.
+const SLEEPER: Srgba = tailwind::SLATE_400;
 /// Cells on each side of the grid that stands for a half-space, a metre each.
 const CELLS: u32 = 10;
 
@@ -23,22 +27,50 @@ type Buffer = GizmoBuffer<TawGizmos, ()>;
 /// Draws all sensors as the last step had them.
 pub(crate) fn sensors(world: &TawWorld, places: &Query<&GlobalTransform>, gizmos: &mut Buffer) {
     for (id, entity) in &world.sensor_entities {
-        let (Ok(shape), Ok(inside)) = (world.sensors.shape(*id), world.sensors.inside(*id)) else {
+        let sensors = &world.sensors;
+        let (Ok(shape), Ok(marbles), Ok(balls)) =
+            (sensors.shape(*id), sensors.inside(*id), sensors.balls_inside(*id))
+        else {
             continue;
         };
-        let color = if inside.is_empty() { EMPTY } else { OCCUPIED };
-        match shape {
-            WallShape::Plane(plane) => {
-                let place = places.get(*entity).map_or(Vec3::ZERO, GlobalTransform::translation);
-                half_space(plane, place, gizmos, color);
-            }
-            WallShape::Solid(shape) => solid(shape, gizmos, color),
-            WallShape::Mesh(mesh, pose) => {
-                surface(&**mesh, |point| from_point(pose.transform_point(point)), gizmos, color);
-            }
-            WallShape::HeightField(field, pose) => {
-                surface(&**field, |point| from_point(pose.transform_point(point)), gizmos, color);
-            }
+        let is_empty = marbles.is_empty() && balls.is_empty();
+        let color = if is_empty { EMPTY } else { OCCUPIED };
+        let place = places.get(*entity).map_or(Vec3::ZERO, GlobalTransform::translation);
+        outline(shape, place, gizmos, color);
+    }
+}
+
+/// Draws all walls as the last step had them.
+pub(crate) fn walls(world: &TawWorld, places: &Query<&GlobalTransform>, gizmos: &mut Buffer) {
+    for (id, entity) in &world.wall_entities {
+        if let Ok(shape) = world.walls.get(*id) {
+            let place = places.get(*entity).map_or(Vec3::ZERO, GlobalTransform::translation);
+            outline(shape, place, gizmos, WALL);
+        }
+    }
+}
+
+/// Draws a sphere around each marble that sleeps.
+pub(crate) fn sleepers(world: &TawWorld, gizmos: &mut Buffer) {
+    for row in 0..world.marbles.len() {
+        let id = world.marbles.id(row);
+        if id.is_some_and(|id| world.is_asleep(id) == Ok(true)) {
+            let center = from_point(world.marbles.position()[row]);
+            gizmos.sphere(center, world.marbles.radius()[row], SLEEPER);
+        }
+    }
+}
+
+/// Draws a shape; of a half-space, a part of it around a place.
+fn outline(shape: &WallShape<f32>, place: Vec3, gizmos: &mut Buffer, color: Srgba) {
+    match shape {
+        WallShape::Plane(plane) => half_space(plane, place, gizmos, color),
+        WallShape::Solid(shape) => solid(shape, gizmos, color),
+        WallShape::Mesh(mesh, pose) => {
+            surface(&**mesh, |point| from_point(pose.transform_point(point)), gizmos, color);
+        }
+        WallShape::HeightField(field, pose) => {
+            surface(&**field, |point| from_point(pose.transform_point(point)), gizmos, color);
         }
     }
 }
@@ -101,6 +133,7 @@ mod tests {
     use crate::TawPlugin;
     use crate::components::Marble;
     use crate::sensor::Sensor;
+    use crate::swarm::{Ball, Swarm};
     use crate::wall::Wall;
     use bevy::ecs::system::RunSystemOnce;
     use bevy::time::TimeUpdateStrategy;
@@ -124,13 +157,18 @@ mod tests {
 
     /// Points and colors of what is drawn of a sensor that is moved and turned.
     fn drawn(sensor: Wall, marble: Option<Vec3>) -> (Vec<Vec3>, Vec<LinearRgba>) {
+        let marble = marble.map(|at| (Marble::new(0.4), Transform::from_translation(at)));
+        drawn_with(sensor, marble)
+    }
+
+    fn drawn_with(sensor: Wall, other: Option<impl Bundle>) -> (Vec<Vec3>, Vec<LinearRgba>) {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, TransformPlugin, TawPlugin));
         app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
         let place = Transform::from_xyz(5.0, 0.0, 0.0).with_rotation(Quat::from_rotation_y(1.0));
         app.world_mut().spawn((sensor, Sensor, place));
-        if let Some(at) = marble {
-            app.world_mut().spawn((Marble::new(0.4), Transform::from_translation(at)));
+        if let Some(other) = other {
+            app.world_mut().spawn(other);
         }
         app.update();
         app.update();
@@ -161,6 +199,33 @@ mod tests {
     }
 
     #[test]
+    fn walls_and_sleepers_are_drawn_where_they_are() {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, TransformPlugin, TawPlugin));
+        app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+        app.world_mut()
+            .spawn((Wall::from(Cuboid::from_length(2.0)), Transform::from_xyz(5.0, -1.0, 0.0)));
+        for x in [5.0, 50.0] {
+            app.world_mut().spawn((Marble::new(0.5), Transform::from_xyz(x, 0.5, 0.0)));
+        }
+        (0..90).for_each(|_| app.update());
+        let draw = |world: Res<TawWorld>, places: Query<&GlobalTransform>| {
+            let (mut boxes, mut spheres) = (Buffer::default(), Buffer::default());
+            walls(&world, &places, &mut boxes);
+            sleepers(&world, &mut spheres);
+            [boxes, spheres].map(|it| [it.list_positions, it.strip_positions].concat())
+        };
+        let drawn = app.world_mut().run_system_once(draw).unwrap();
+        for (points, center, reach) in
+            [(&drawn[0], vec3(5.0, -1.0, 0.0), 1.74), (&drawn[1], vec3(5.0, 0.5, 0.0), 0.52)]
+        {
+            let points = points.iter().filter(|point| point.is_finite());
+            let far: Vec<_> = points.map(|point| point.distance(center)).collect();
+            assert!(far.len() > 10 && far.iter().all(|it| *it < reach), "{far:?}");
+        }
+    }
+
+    #[test]
     fn a_sensor_with_a_marble_inside_has_another_color() {
         for wall in kinds() {
             let is = |color: Srgba, marble: Option<Vec3>| {
@@ -172,5 +237,13 @@ mod tests {
             assert!(is(EMPTY, Some(vec3(0.0, 50.0, 0.0))), "{wall:?}");
             assert!(is(OCCUPIED, Some(vec3(5.0, 0.1, 0.0))), "{wall:?}");
         }
+    }
+
+    #[test]
+    fn a_sensor_with_a_ball_inside_has_it_too() {
+        let swarm = Swarm::new(vec![Ball::new(vec3(5.0, 0.1, 0.0), 0.4)]);
+        let (_, colors) = drawn_with(Sphere::new(1.0).into(), Some(swarm));
+        let mut colors = colors.into_iter().filter(|it| !it.red.is_nan());
+        assert!(colors.all(|it| it == LinearRgba::from(OCCUPIED)));
     }
 }

@@ -33,7 +33,8 @@ use crate::spatial_query::{SpatialQuery, SpatialQueryFilter};
 /// All marbles and walls count, where they were after the last step, drawn or not, except those with a
 /// [`Pickable`] that is not hoverable, as `Pickable::IGNORE` of a wall that nobody sees, those in no
 /// [`RenderLayers`] of the camera, and those that the camera is in. Positions and normals
-/// of hits are those of the surface, in world space. Balls of swarms and sensors are not found.
+/// of hits are those of the surface, in world space. Balls of swarms and sensors are not found:
+/// a [`SpatialQuery`] with the ray of the pointer finds balls.
 #[derive(Debug, Default)]
 pub struct TawPickingPlugin;
 
@@ -58,7 +59,7 @@ fn report_hits(
             drawn.intersects(layers.get(entity).unwrap_or_default())
                 && pickables.get(entity).map_or(true, |it| it.is_hoverable)
         };
-        let filter = SpatialQueryFilter::default().with_predicate(&is_picked);
+        let filter = SpatialQueryFilter::default().without_balls().with_predicate(&is_picked);
         let of_ray = spatial.cast_ray_all(*ray, f32::INFINITY, &filter);
         let picks = of_ray.into_iter().filter(|hit| hit.distance > 0.0).map(|hit| {
             let (point, normal) = (Some(hit.point), Some(hit.normal));

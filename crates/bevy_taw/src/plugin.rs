@@ -16,18 +16,18 @@ use crate::ignore::{self, ColliderDisabled, IgnoreCollisions, OneWay};
 use crate::ignored::{self, IgnoredComponents};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::layers::CollisionLayers;
-use crate::messages::{self, Touches};
 use crate::refusal::{self, InputRefused, MarbleStopped, Refusals, Told, report};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::schedule::{SchedulePlugin, TawSchedule};
 use crate::snapshot::RowRemoved;
 use crate::spatial_query::SpatialTree;
-use crate::swarm::{self, TawSwarmModel};
+use crate::swarm::{self, Swarm, TawSwarmModel};
+use crate::touches::{self, Touches};
 use crate::wall::Wall;
 use crate::zones::{GravityZone, WindZone, ZoneGravity};
 use crate::{
-    contact_force, controller, forget, gather, gather_walls, grounded, scatter, sensor, sleep,
-    zones,
+    ball_sensor, contact_force, controller, forget, gather, gather_walls, grounded, scatter,
+    sensor, sleep, zones,
 };
 
 /// Everything: the physics, interpolation between its steps, and with the feature
@@ -134,7 +134,6 @@ impl Plugin for TawPlugin {
         app.init_resource::<TawWorld>()
             .init_resource::<TawModel>()
             .init_resource::<TawSwarmModel>()
-            .init_resource::<swarm::Owners>()
             .init_resource::<Gravity>()
             .init_resource::<Forces>()
             .init_resource::<SubstepDelta>()
@@ -156,7 +155,7 @@ impl Plugin for TawPlugin {
             .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
             .register_type::<(Grounded, ContactForce, MarbleController, GravityZone, WindZone)>()
             .register_type::<(IgnoreCollisions, ColliderDisabled, OneWay)>()
-            .register_type::<(TawModel, Gravity, SubstepDelta, SurfaceVelocity)>();
+            .register_type::<(TawModel, Gravity, SubstepDelta, SurfaceVelocity, Swarm)>();
         diagnostics::register(app);
         sensor::register(app);
         observe(app);
@@ -279,14 +278,16 @@ fn add_scatter(app: &mut App) {
             swarm::report_stopped,
             sensor::scatter,
             sensor::scatter_balls,
+            ball_sensor::write.run_if(ball_sensor::are_read),
+            ball_sensor::forget.run_if(not(ball_sensor::are_read)),
             grounded::find.run_if(any_with_component::<Grounded>),
             contact_force::finish.run_if(contact_force::are_read),
             contact_force::forget.run_if(not(contact_force::are_read)),
             contact_force::write.run_if(any_with_component::<ContactForce>),
-            messages::write.run_if(messages::are_read),
-            messages::forget.run_if(not(messages::are_read)),
+            touches::write.run_if(touches::are_read),
+            touches::forget.run_if(not(touches::are_read)),
             diagnostics::measure,
-            messages::trigger.run_if(messages::are_observed),
+            touches::trigger.run_if(touches::are_observed),
         )
             .chain(),
     )
@@ -305,10 +306,10 @@ fn add_substep(app: &mut App) {
             integrate.in_set(TawSystems::Integrate),
             generate_contacts.in_set(TawSystems::GenerateContacts),
             // What a game takes out of the contacts before they are restituted is not told.
-            (messages::collect.run_if(messages::are_read), restitute)
+            (touches::collect.run_if(touches::are_read), restitute)
                 .chain()
                 .in_set(TawSystems::Restitute),
-            messages::collect_impacts.run_if(messages::are_read).after(TawSystems::Restitute),
+            touches::collect_impacts.run_if(touches::are_read).after(TawSystems::Restitute),
             contact_force::collect.run_if(contact_force::are_read).after(TawSystems::Restitute),
         ),
     );

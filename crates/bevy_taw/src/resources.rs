@@ -3,8 +3,10 @@
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use taw::motion::ForceField;
+use taw::swarm::BallId;
 use taw::world::{Marble, MarbleId, Model, SensorId, WallId};
 
+use crate::ball_sensor::SensedBall;
 use crate::contact_force::PairImpulse;
 use crate::messages::ContactPair;
 use crate::reflect::ModelReflect;
@@ -79,8 +81,12 @@ pub struct TawWorld {
     pub(crate) marble_entities: HashMap<MarbleId, Entity>,
     pub(crate) wall_entities: HashMap<WallId, Entity>,
     pub(crate) sensor_entities: HashMap<SensorId, Entity>,
+    /// Entity of the swarm of each slot of balls, also of those that are gone.
+    pub(crate) ball_entities: Vec<Option<Entity>>,
     /// Marbles inside of sensors, also those that are gone.
     pub(crate) sensed: HashMap<(SensorId, MarbleId), Entity>,
+    /// Balls of swarms inside of sensors, sorted; none while nobody listens.
+    pub(crate) sensed_balls: Vec<SensedBall>,
     /// Events [`SensorLeft`](crate::sensor::SensorLeft) that are not sent yet: sensor and marble.
     pub(crate) left_sensors: Vec<(Entity, Entity)>,
     /// Sensor entities whose list of marbles inside is out of date.
@@ -92,6 +98,8 @@ pub struct TawWorld {
     /// Number of restores, and true if there was one since the last gather.
     pub(crate) restored: u32,
     pub(crate) just_restored: bool,
+    /// Walls that move in this step, or did in the last one.
+    pub(crate) moving_walls: Vec<WallId>,
     /// The walls' version when they were last gathered.
     pub(crate) walls_gathered: u64,
     /// True if the world refused to integrate, and the rest of the substep is left out.
@@ -111,5 +119,30 @@ impl TawWorld {
     pub fn wall_entity(&self, row: u32) -> Option<Entity> {
         let id = self.world.walls.id(row as usize)?;
         self.wall_entities.get(&id).copied()
+    }
+
+    /// The entity of the [`Swarm`](crate::swarm::Swarm) that a ball is one of, if there is one.
+    #[must_use]
+    pub fn swarm_of(&self, ball: BallId) -> Option<Entity> {
+        let row = self.world.swarm.row(ball).ok()?;
+        let is_own = !self.world.swarm.is_marble(row);
+        is_own.then(|| self.entity_of_slot(self.world.swarm.slots()[row])).flatten()
+    }
+
+    /// The entity of the swarm of a slot.
+    pub(crate) fn entity_of_slot(&self, slot: u32) -> Option<Entity> {
+        self.ball_entities.get(slot as usize).copied().flatten()
+    }
+
+    /// Notes that balls are a swarm's.
+    pub(crate) fn note_balls(&mut self, swarm: Entity, balls: &[BallId]) {
+        for ball in balls {
+            let Ok(row) = self.world.swarm.row(*ball) else { continue };
+            let slot = self.world.swarm.slots()[row] as usize;
+            if self.ball_entities.len() <= slot {
+                self.ball_entities.resize(slot + 1, None);
+            }
+            self.ball_entities[slot] = Some(swarm);
+        }
     }
 }

@@ -18,15 +18,18 @@
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::world::DeferredWorld;
 use bevy::prelude::*;
+use bevy::reflect::{ReflectDeserialize, ReflectSerialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use taw::swarm::BallId;
 use taw::world::{MarbleId, SensorId};
 
+pub use crate::ball_sensor::{BallEntered, BallLeft};
 use crate::components::WallState;
 use crate::resources::TawWorld;
 
 /// Makes a sensor of a [`Wall`]: marbles pass through it, and it reports which of them enter and leave,
 /// by [`SensorEntered`] and [`SensorLeft`], and which are inside, by [`CollidingEntities`]; of the balls of
-/// swarms, which are inside after each step, by [`CollidingBalls`]. Without a wall it has no shape and
+/// swarms, which are inside after each step, by [`CollidingBalls`], [`BallEntered`] and [`BallLeft`]. Without a wall it has no shape and
 /// notices nobody, as [`IgnoredComponents`](crate::ignored::IgnoredComponents) says.
 ///
 /// It may be moved as a wall, by itself or by what carries it, and has [`CollisionLayers`]. A marble
@@ -59,8 +62,25 @@ pub struct CollidingEntities(Vec<Entity>);
 ///     }
 /// }
 /// ```
-#[derive(Component, Clone, Debug, Default, PartialEq, Eq, Deref)]
+///
+/// As a value for other programs, the list of the [bits](BallId::to_bits).
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq, Deref, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CollidingBalls(Vec<BallId>);
+
+impl Serialize for CollidingBalls {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.iter().map(|ball| ball.to_bits()))
+    }
+}
+
+impl<'de> Deserialize<'de> for CollidingBalls {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let bits = Vec::<u64>::deserialize(deserializer)?;
+        Ok(Self(bits.into_iter().map(BallId::from_bits).collect()))
+    }
+}
 
 /// Message, and event of the sensor's entity: a marble entered a sensor.
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Reflect)]
@@ -92,7 +112,7 @@ pub struct SensorLeft {
 pub(crate) fn register(app: &mut App) {
     app.add_message::<SensorEntered>()
         .add_message::<SensorLeft>()
-        .register_type::<(Sensor, CollidingEntities, SensorEntered, SensorLeft)>()
+        .register_type::<(Sensor, CollidingEntities, CollidingBalls, SensorEntered, SensorLeft)>()
         .add_observer(forget);
 }
 

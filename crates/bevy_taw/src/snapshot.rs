@@ -6,6 +6,7 @@ use bevy::prelude::*;
 use taw::swarm::BallId;
 use taw::world::{MarbleId, SensorId, WallId};
 
+use crate::ball_sensor::SensedBall;
 use crate::components::{MarbleState, Sleeping, WallState};
 use crate::contact_force::PairImpulse;
 use crate::messages::ContactPair;
@@ -18,6 +19,9 @@ pub struct TawSnapshot {
     marble_entities: HashMap<MarbleId, Entity>,
     wall_entities: HashMap<WallId, Entity>,
     sensor_entities: HashMap<SensorId, Entity>,
+    ball_entities: Vec<Option<Entity>>,
+    sensed_balls: Vec<SensedBall>,
+    moving_walls: Vec<WallId>,
     sensed: HashMap<(SensorId, MarbleId), Entity>,
     pair_impulses: Vec<(ContactPair, PairImpulse)>,
 }
@@ -44,6 +48,9 @@ impl TawWorld {
             marble_entities: self.marble_entities.clone(),
             wall_entities: self.wall_entities.clone(),
             sensor_entities: self.sensor_entities.clone(),
+            ball_entities: self.ball_entities.clone(),
+            sensed_balls: self.sensed_balls.clone(),
+            moving_walls: self.moving_walls.clone(),
             sensed: self.sensed.clone(),
             pair_impulses: self.pair_impulses.clone(),
         }
@@ -80,6 +87,9 @@ impl TawWorld {
         self.wall_entities.clone_from(&snapshot.wall_entities);
         self.stale_sensors.extend(self.sensor_entities.values());
         self.sensor_entities.clone_from(&snapshot.sensor_entities);
+        self.ball_entities.clone_from(&snapshot.ball_entities);
+        self.sensed_balls.clone_from(&snapshot.sensed_balls);
+        self.moving_walls.clone_from(&snapshot.moving_walls);
         self.sensed.clone_from(&snapshot.sensed);
         self.pair_impulses.clone_from(&snapshot.pair_impulses);
         self.left_sensors.clear();

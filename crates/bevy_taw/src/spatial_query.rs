@@ -1,8 +1,8 @@
-//! Rays, shapes and points among marbles and walls, in Bevy's types and entities.
+//! Rays, shapes and points among marbles, walls and balls of swarms, in Bevy's types and entities.
 //!
 //! Positions are those after the last fixed step, up to a step ahead of what
-//! [`TawInterpolationPlugin`](crate::interpolation::TawInterpolationPlugin) draws. Balls of swarms are
-//! not found: a ray on them is [`TawWorld::cast_ray_on_balls`].
+//! [`TawInterpolationPlugin`](crate::interpolation::TawInterpolationPlugin) draws. For a ball of a swarm, the
+//! entity is that of its [`Swarm`](crate::swarm::Swarm), and `ball` says which one it is.
 //!
 //! ```
 //! # use bevy::prelude::*;
@@ -30,8 +30,10 @@ use bevy::ecs::entity::EntityHashSet;
 use bevy::ecs::system::SystemParam;
 use bevy::math::Isometry3d;
 use bevy::prelude::*;
+use taw::broad::CollisionLayers as CoreLayers;
 use taw::frame::Ray;
 use taw::shape as core;
+use taw::swarm::{BallId, BallQueries, BallQueryHit, BallTree};
 use taw::world::{ColliderId, Queries, QueryHit, QueryTree};
 
 use crate::components::{MarbleState, WallState};
@@ -49,36 +51,65 @@ pub struct SpatialQuery<'w, 's> {
     walls: Query<'w, 's, &'static WallState>,
 }
 
-/// Query tree of the world, with the change of the world that it was last fitted to.
+/// Query trees of the world and of the swarm.
 #[derive(Resource, Default)]
-pub(crate) struct SpatialTree(Mutex<FittedTree>);
-
-#[derive(Default)]
-struct FittedTree {
-    fitted_to: Option<Tick>,
-    tree: Arc<QueryTree<f32>>,
+pub(crate) struct SpatialTree {
+    colliders: Mutex<FittedTree<QueryTree<f32>>>,
+    balls: Mutex<FittedTree<BallTree<f32>>>,
 }
 
-/// Colliders that a query looks at: by default all marbles and walls.
+/// Tree with the change of the world that it was last fitted to.
+#[derive(Default)]
+struct FittedTree<T> {
+    fitted_to: Option<Tick>,
+    tree: Arc<T>,
+}
+
+impl<T: Clone> FittedTree<T> {
+    /// The tree as it is after a change, fitted by `fit` if it is older.
+    fn at(this: &Mutex<Self>, now: Tick, fit: impl FnOnce(&mut T)) -> Arc<T> {
+        let mut this = this.lock().unwrap_or_else(PoisonError::into_inner);
+        if this.fitted_to != Some(now) {
+            fit(Arc::make_mut(&mut this.tree));
+            this.fitted_to = Some(now);
+        }
+        Arc::clone(&this.tree)
+    }
+}
+
+/// Colliders that a query looks at: by default all marbles, walls and balls of swarms. An excluded entity
+/// may be a swarm's, and a predicate is asked about it, too.
 #[derive(Clone, Default)]
 pub struct SpatialQueryFilter<'a> {
     mask: Option<LayerMask>,
-    kind: Option<Kind>,
+    kinds: Kinds,
     excluded: EntityHashSet,
     predicate: Option<&'a dyn Fn(Entity) -> bool>,
 }
 
+/// Kinds of colliders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Marbles,
-    Walls,
+struct Kinds {
+    marbles: bool,
+    walls: bool,
+    balls: bool,
+}
+
+impl Kinds {
+    const NONE: Self = Self { marbles: false, walls: false, balls: false };
+}
+
+impl Default for Kinds {
+    fn default() -> Self {
+        Self { marbles: true, walls: true, balls: true }
+    }
 }
 
 impl std::fmt::Debug for SpatialQueryFilter<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("SpatialQueryFilter")
             .field("mask", &self.mask)
-            .field("kind", &self.kind)
+            .field("kinds", &self.kinds)
             .field("excluded", &self.excluded)
             .field("predicate", &self.predicate.is_some())
             .finish()
@@ -89,13 +120,26 @@ impl<'a> SpatialQueryFilter<'a> {
     /// Marbles only.
     #[must_use]
     pub fn marbles() -> Self {
-        Self { kind: Some(Kind::Marbles), ..Self::default() }
+        Self { kinds: Kinds { marbles: true, ..Kinds::NONE }, ..Self::default() }
     }
 
     /// Walls only.
     #[must_use]
     pub fn walls() -> Self {
-        Self { kind: Some(Kind::Walls), ..Self::default() }
+        Self { kinds: Kinds { walls: true, ..Kinds::NONE }, ..Self::default() }
+    }
+
+    /// Balls of swarms only.
+    #[must_use]
+    pub fn balls() -> Self {
+        Self { kinds: Kinds { balls: true, ..Kinds::NONE }, ..Self::default() }
+    }
+
+    /// Leaves out the balls of swarms. The first question that does not fits a tree to them after each
+    /// step, which takes some nanoseconds for each.
+    #[must_use]
+    pub fn without_balls(self) -> Self {
+        Self { kinds: Kinds { balls: false, ..self.kinds }, ..self }
     }
 
     /// Restricts to those in one of these layers: a [`PhysicsLayer`](crate::layers::PhysicsLayer), an
@@ -120,25 +164,36 @@ impl<'a> SpatialQueryFilter<'a> {
 
     fn admits(&self, world: &TawWorld, collider: ColliderId) -> bool {
         let right_kind = match collider {
-            ColliderId::Marble(_) => self.kind != Some(Kind::Walls),
-            ColliderId::Wall(_) => self.kind != Some(Kind::Marbles),
-        };
-        let in_mask = |mask: LayerMask| {
-            world.layers(collider).is_ok_and(|layers| layers.memberships & mask.0 != 0)
+            ColliderId::Marble(_) => self.kinds.marbles,
+            ColliderId::Wall(_) => self.kinds.walls,
         };
         right_kind
-            && self.mask.is_none_or(in_mask)
-            && world.collider_entity(collider).is_some_and(|entity| {
-                !self.excluded.contains(&entity) && self.predicate.is_none_or(|is| is(entity))
-            })
+            && self.admits_layers(|| world.layers(collider))
+            && self.admits_entity(world.collider_entity(collider))
+    }
+
+    fn admits_ball(&self, world: &TawWorld, ball: BallId) -> bool {
+        self.admits_layers(|| world.swarm.layers(ball)) && self.admits_entity(world.swarm_of(ball))
+    }
+
+    fn admits_layers(&self, layers: impl FnOnce() -> Result<CoreLayers, taw::Error>) -> bool {
+        self.mask.is_none_or(|mask| layers().is_ok_and(|it| it.memberships & mask.0 != 0))
+    }
+
+    fn admits_entity(&self, entity: Option<Entity>) -> bool {
+        entity.is_some_and(|entity| {
+            !self.excluded.contains(&entity) && self.predicate.is_none_or(|is| is(entity))
+        })
     }
 }
 
 /// Hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
-    /// The marble or wall.
+    /// The marble, wall or swarm.
     pub entity: Entity,
+    /// Which ball it is, if it is one of a swarm.
+    pub ball: Option<BallId>,
     /// Distance from the origin of the ray, in metres; zero if that is inside.
     pub distance: f32,
     /// Point on the surface, or the origin, in metres in world space.
@@ -147,11 +202,20 @@ pub struct RayHit {
     pub normal: Vec3,
 }
 
+impl RayHit {
+    fn new(entity: Entity, ball: Option<BallId>, hit: taw::contact::RayHit<f32>) -> Self {
+        let (point, normal) = (from_point(hit.point), from_vector(hit.normal));
+        Self { entity, ball, distance: hit.distance, point, normal }
+    }
+}
+
 /// Hit of a moving shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShapeHit {
-    /// The marble or wall.
+    /// The marble, wall or swarm.
     pub entity: Entity,
+    /// Which ball it is, if it is one of a swarm.
+    pub ball: Option<BallId>,
     /// Time of impact as a fraction of the translation, in [0, 1].
     pub fraction: f32,
     /// Contact point at that time, in metres.
@@ -160,17 +224,33 @@ pub struct ShapeHit {
     pub normal: Vec3,
 }
 
+impl ShapeHit {
+    fn new(entity: Entity, ball: Option<BallId>, hit: taw::contact::ShapeCastHit<f32>) -> Self {
+        let (point, normal) = (from_point(hit.point), from_vector(hit.normal));
+        Self { entity, ball, fraction: hit.time, point, normal }
+    }
+}
+
 /// Point on the surface nearest to another point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProjectedPoint {
-    /// The marble or wall.
+    /// The marble, wall or swarm.
     pub entity: Entity,
+    /// Which ball it is, if it is one of a swarm.
+    pub ball: Option<BallId>,
     /// Point on its surface, in metres in world space.
     pub point: Vec3,
     /// Outward unit normal there.
     pub normal: Vec3,
     /// Distance to the surface in metres; negative inside.
     pub distance: f32,
+}
+
+impl ProjectedPoint {
+    fn new(entity: Entity, ball: Option<BallId>, hit: core::PointProjection<f32>) -> Self {
+        let (point, normal) = (from_point(hit.point), from_vector(hit.normal));
+        Self { entity, ball, point, normal, distance: hit.distance }
+    }
 }
 
 /// Shape of a query: a [`Sphere`], a [`Cuboid`] or a [`Capsule3d`] of Bevy's.
@@ -216,7 +296,8 @@ impl SpatialQuery<'_, '_> {
         self.cast_ray_all(ray, max_distance, filter).into_iter().next()
     }
 
-    /// First hit of a ray on each marble and wall within a distance in metres, nearest first.
+    /// First hit of a ray on each marble, wall and ball of a swarm within a distance in metres, nearest
+    /// first.
     #[must_use]
     pub fn cast_ray_all(
         &self,
@@ -227,16 +308,20 @@ impl SpatialQuery<'_, '_> {
         let direction = to_vector(ray.direction.into());
         let ray = Ray { origin: to_point(ray.origin), direction };
         let admits = |collider| filter.admits(&self.world, collider);
-        let hits = self.ask(|queries| queries.cast_ray_all(&ray, max_distance, admits));
-        let hit = |QueryHit { collider, result }: QueryHit<taw::contact::RayHit<f32>>| {
-            Some(RayHit {
-                entity: self.world.collider_entity(collider)?,
-                distance: result.distance,
-                point: from_point(result.point),
-                normal: from_vector(result.normal),
-            })
-        };
-        hits.into_iter().filter_map(hit).collect()
+        let hits = self.ask(filter, |queries| queries.cast_ray_all(&ray, max_distance, admits));
+        let hits = hits.into_iter().flatten().filter_map(|QueryHit { collider, result }| {
+            Some(RayHit::new(self.world.collider_entity(collider)?, None, result))
+        });
+        let mut hits: Vec<_> = hits.collect();
+        let admits = |ball| filter.admits_ball(&self.world, ball);
+        let balls = self.ask_balls(filter, |it| it.cast_ray_all(&ray, max_distance, admits));
+        if let Some(balls) = balls.filter(|balls| !balls.is_empty()) {
+            hits.extend(balls.into_iter().filter_map(|BallQueryHit { ball, result }| {
+                Some(RayHit::new(self.world.swarm_of(ball)?, Some(ball), result))
+            }));
+            hits.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+        }
+        hits
     }
 
     /// First hit of a shape that moves by a translation, in metres. What it touches at the start
@@ -251,20 +336,22 @@ impl SpatialQuery<'_, '_> {
         translation: Vec3,
         filter: &SpatialQueryFilter,
     ) -> Result<Option<ShapeHit>, taw::Error> {
-        let shape = shape.placed(from)?;
+        let (shape, translation) = (shape.placed(from)?, to_vector(translation));
         let admits = |collider| filter.admits(&self.world, collider);
-        let hit = self.ask(|queries| queries.cast_shape(&shape, to_vector(translation), admits));
-        Ok(hit.and_then(|QueryHit { collider, result }| {
-            Some(ShapeHit {
-                entity: self.world.collider_entity(collider)?,
-                fraction: result.time,
-                point: from_point(result.point),
-                normal: from_vector(result.normal),
-            })
-        }))
+        let hit = self.ask(filter, |queries| queries.cast_shape(&shape, translation, admits));
+        let hit = hit.flatten().and_then(|QueryHit { collider, result }| {
+            Some(ShapeHit::new(self.world.collider_entity(collider)?, None, result))
+        });
+        let admits = |ball| filter.admits_ball(&self.world, ball);
+        let ball = self.ask_balls(filter, |it| it.cast_shape(&shape, translation, admits));
+        let ball = ball.flatten().and_then(|BallQueryHit { ball, result }| {
+            Some(ShapeHit::new(self.world.swarm_of(ball)?, Some(ball), result))
+        });
+        Ok(first(hit, ball, |it| it.fraction))
     }
 
-    /// All marbles and walls that overlap a shape.
+    /// All marbles, walls and swarms that overlap a shape: a swarm if one of its balls does, once. Which
+    /// of them, [`overlapping_balls`](Self::overlapping_balls) says.
     ///
     /// # Errors
     /// A size or a place out of range.
@@ -274,10 +361,33 @@ impl SpatialQuery<'_, '_> {
         at: Isometry3d,
         filter: &SpatialQueryFilter,
     ) -> Result<Vec<Entity>, taw::Error> {
-        let shape = shape.placed(at)?;
+        let placed = shape.placed(at)?;
         let admits = |collider| filter.admits(&self.world, collider);
-        let found = self.ask(|queries| queries.overlaps(&shape, admits));
-        Ok(found.into_iter().filter_map(|it| self.world.collider_entity(it)).collect())
+        let found = self.ask(filter, |queries| queries.overlaps(&placed, admits));
+        let found = found.into_iter().flatten();
+        let mut found: Vec<_> = found.filter_map(|it| self.world.collider_entity(it)).collect();
+        let balls = self.overlapping_balls(shape, at, filter)?;
+        let mut swarms: Vec<_> =
+            balls.into_iter().filter_map(|ball| self.world.swarm_of(ball)).collect();
+        swarms.sort_unstable();
+        swarms.dedup();
+        found.append(&mut swarms);
+        Ok(found)
+    }
+
+    /// All balls of swarms that overlap a shape, sorted; [`TawWorld::swarm_of`] says which swarm one is of.
+    ///
+    /// # Errors
+    /// A size or a place out of range.
+    pub fn overlapping_balls(
+        &self,
+        shape: &impl QueryShape,
+        at: Isometry3d,
+        filter: &SpatialQueryFilter,
+    ) -> Result<Vec<BallId>, taw::Error> {
+        let shape = shape.placed(at)?;
+        let admits = |ball| filter.admits_ball(&self.world, ball);
+        Ok(self.ask_balls(filter, |it| it.overlaps(&shape, admits)).unwrap_or_default())
     }
 
     /// Point on the nearest surface within a distance in metres, which may be infinite. Inside of
@@ -289,15 +399,18 @@ impl SpatialQuery<'_, '_> {
         max_distance: f32,
         filter: &SpatialQueryFilter,
     ) -> Option<ProjectedPoint> {
+        let at = to_point(point);
         let admits = |collider| filter.admits(&self.world, collider);
-        let hit =
-            self.ask(|queries| queries.project_point(to_point(point), max_distance, admits))?;
-        Some(ProjectedPoint {
-            entity: self.world.collider_entity(hit.collider)?,
-            point: from_point(hit.result.point),
-            normal: from_vector(hit.result.normal),
-            distance: hit.result.distance,
-        })
+        let hit = self.ask(filter, |queries| queries.project_point(at, max_distance, admits));
+        let hit = hit.flatten().and_then(|QueryHit { collider, result }| {
+            Some(ProjectedPoint::new(self.world.collider_entity(collider)?, None, result))
+        });
+        let admits = |ball| filter.admits_ball(&self.world, ball);
+        let ball = self.ask_balls(filter, |it| it.project_point(at, max_distance, admits));
+        let ball = ball.flatten().and_then(|BallQueryHit { ball, result }| {
+            Some(ProjectedPoint::new(self.world.swarm_of(ball)?, Some(ball), result))
+        });
+        first(hit, ball, |it| it.distance)
     }
 
     /// Collider of a marble or wall in the [`TawWorld`], once a step has gathered it.
@@ -308,18 +421,42 @@ impl SpatialQuery<'_, '_> {
         marble().or_else(wall)
     }
 
-    /// Runs a query on a tree that is up to date. It may run others.
-    fn ask<R>(&self, question: impl FnOnce(&Queries<f32>) -> R) -> R {
-        let now = Some(self.world.last_changed());
-        let tree = {
-            let mut fitted = self.tree.0.lock().unwrap_or_else(PoisonError::into_inner);
-            if fitted.fitted_to != now {
-                Arc::make_mut(&mut fitted.tree).update(&self.world);
-                fitted.fitted_to = now;
-            }
-            Arc::clone(&fitted.tree)
-        };
-        question(&self.world.queries_of(&tree))
+    /// Runs a query of marbles and walls on a tree that is up to date, if the filter has any. It may run
+    /// others.
+    fn ask<R>(
+        &self,
+        filter: &SpatialQueryFilter,
+        question: impl FnOnce(&Queries<f32>) -> R,
+    ) -> Option<R> {
+        let Kinds { marbles, walls, .. } = filter.kinds;
+        if !marbles && !walls {
+            return None;
+        }
+        let now = self.world.last_changed();
+        let tree = FittedTree::at(&self.tree.colliders, now, |tree| tree.update(&self.world));
+        Some(question(&self.world.queries_of(&tree)))
+    }
+
+    /// Runs a query of balls of swarms, likewise.
+    fn ask_balls<R>(
+        &self,
+        filter: &SpatialQueryFilter,
+        question: impl FnOnce(&BallQueries<f32>) -> R,
+    ) -> Option<R> {
+        if !filter.kinds.balls || self.world.swarm.is_empty() {
+            return None;
+        }
+        let now = self.world.last_changed();
+        let tree = FittedTree::at(&self.tree.balls, now, |tree| tree.update(&self.world.swarm));
+        Some(question(&self.world.swarm.queries(&tree)))
+    }
+}
+
+/// The one of two hits that comes first.
+fn first<T>(a: Option<T>, b: Option<T>, key: impl Fn(&T) -> f32) -> Option<T> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(if key(&b) < key(&a) { b } else { a }),
+        (a, b) => a.or(b),
     }
 }
 

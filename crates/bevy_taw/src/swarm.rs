@@ -35,19 +35,27 @@ pub use taw::swarm::BallId;
 ///     commands.spawn(Swarm::filling(region, 1_000, 0.1..=0.2, 1));
 /// });
 /// ```
-#[derive(Component, Clone, Debug, Default)]
+///
+/// Reflected is the tint alone.
+#[derive(Component, Clone, Debug, Default, Reflect)]
+#[reflect(Component, Debug, Default)]
 pub struct Swarm {
     /// Meaning of the colour of a marble.
     pub tint: Tint,
+    #[reflect(ignore)]
     coming: Vec<Ball>,
+    #[reflect(ignore)]
     going: Vec<BallId>,
+    #[reflect(ignore)]
     balls: Vec<BallId>,
     /// Layers that the balls have.
+    #[reflect(ignore)]
     layers: CollisionLayers,
 }
 
 /// Meaning of the colour of a marble.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Debug, Default, PartialEq)]
 pub enum Tint {
     /// Which one it is: each has a colour of its own.
     #[default]
@@ -184,32 +192,23 @@ fn draw(seed: u64, n: u64) -> f32 {
     (bits >> 40) as f32 / (1_u32 << 24) as f32
 }
 
-/// Whose the marbles are.
-#[derive(Resource, Debug, Default)]
-pub(crate) struct Owners {
-    /// The entity of each slot of the swarm.
-    pub of_slot: Vec<Option<Entity>>,
-    /// The swarm's removals when it was last gathered.
-    removals: u64,
-}
-
 /// Puts new marbles in, and takes those out that go.
 pub(crate) fn gather(
     mut world: ResMut<TawWorld>,
     mut swarms: Query<(Entity, &mut Swarm, Option<&CollisionLayers>)>,
-    mut owners: ResMut<Owners>,
     model: Res<TawSwarmModel>,
     mut refusals: Refusals,
     mut removed: MessageWriter<RowRemoved>,
+    mut removals: Local<u64>,
 ) {
     if **model != world.swarm.model() {
         refusals.check(None, world.swarm.set_model(**model));
     }
     if world.just_restored {
         let named = swarms.iter_mut().map(|(entity, swarm, _)| (entity, swarm));
-        name_balls(&mut world, named, &mut owners, &mut removed);
+        name_balls(&mut world, named, &mut removed);
     }
-    let any_gone = world.swarm.removals() != owners.removals;
+    let any_gone = world.swarm.removals() != *removals;
     for (entity, mut swarm, layers) in &mut swarms {
         if any_gone {
             forget_gone(&world, &mut swarm);
@@ -225,14 +224,14 @@ pub(crate) fn gather(
         let coming: Vec<_> = swarm.coming.drain(..).map(taw::swarm::Ball::from).collect();
         let old = if moved { 0 } else { swarm.balls.len() };
         let inserted = world.swarm.insert(&coming).map(|balls| {
-            owners.note(&world, entity, &balls);
+            world.note_balls(entity, &balls);
             swarm.balls.extend(balls);
         });
         refusals.check(Some(entity), inserted);
         swarm.layers = layers;
         refusals.check(Some(entity), world.swarm.set_layers(&swarm.balls[old..], layers.into()));
     }
-    owners.removals = world.swarm.removals();
+    *removals = world.swarm.removals();
 }
 
 /// Forgets the balls of a swarm that somebody else removed.
@@ -244,33 +243,19 @@ fn forget_gone(world: &TawWorld, swarm: &mut Mut<Swarm>) {
     }
 }
 
-impl Owners {
-    fn note(&mut self, world: &TawWorld, entity: Entity, balls: &[BallId]) {
-        for ball in balls {
-            let Ok(row) = world.swarm.row(*ball) else { continue };
-            let slot = world.swarm.slots()[row] as usize;
-            if self.of_slot.len() <= slot {
-                self.of_slot.resize(slot + 1, None);
-            }
-            self.of_slot[slot] = Some(entity);
-        }
-    }
-}
-
 /// Gives swarms the balls that they have in a restored world, and takes out what is nobody's.
 fn name_balls<'a>(
     world: &mut TawWorld,
     swarms: impl Iterator<Item = (Entity, Mut<'a, Swarm>)>,
-    owners: &mut Owners,
     removed: &mut MessageWriter<RowRemoved>,
 ) {
-    owners.of_slot.clear();
+    world.ball_entities.clear();
     let mut owned = HashSet::default();
     for (entity, mut swarm) in swarms {
         let Swarm { balls, going, .. } = &mut *swarm;
         balls.retain(|ball| world.swarm.row(*ball).is_ok());
         going.retain(|ball| world.swarm.row(*ball).is_ok());
-        owners.note(world, entity, balls);
+        world.note_balls(entity, balls);
         owned.extend(balls.iter().chain(&*going).copied());
     }
     let lost = lost_balls(world, &owned);
@@ -281,8 +266,8 @@ fn name_balls<'a>(
     }
 }
 
-/// The marbles of a swarm go when it goes.
-pub(crate) fn forget(removed: On<Remove, Swarm>, mut app: DeferredWorld) {
+/// The marbles of a swarm go when it goes, or another one takes its place.
+pub(crate) fn forget(removed: On<Discard, Swarm>, mut app: DeferredWorld) {
     let Some(swarm) = app.get::<Swarm>(removed.entity) else { return };
     let balls: Vec<_> = swarm.balls.iter().chain(&swarm.going).copied().collect();
     let mut world = app.resource_mut::<TawWorld>();

@@ -12,7 +12,7 @@ use bevy::tasks::ComputeTaskPool;
 
 use crate::resources::TawWorld;
 use crate::schedule::TawSchedule;
-use crate::swarm::{Owners, Swarm, Tint, heat};
+use crate::swarm::{Swarm, Tint, heat};
 
 /// Draws all [swarms](Swarm): lit, shadowed and casting shadows as meshes are.
 ///
@@ -105,7 +105,7 @@ fn draw(
     mut meshes: ResMut<Assets<Mesh>>,
     mut buffers: ResMut<Assets<ShaderBuffer>>,
     mut materials: ResMut<Assets<SwarmMaterial>>,
-    (world, owners, fixed): (Res<TawWorld>, Res<Owners>, Res<Time<Fixed>>),
+    (world, fixed): (Res<TawWorld>, Res<Time<Fixed>>),
     swarms: Query<(Entity, Ref<Swarm>)>,
     mut was: Local<(usize, bool)>,
 ) {
@@ -123,7 +123,7 @@ fn draw(
     let blocks = swarm.len().div_ceil(BLOCK).max(drawn.blocks.len()).max(1);
     let tints: Vec<_> = swarms.iter().map(|(entity, swarm)| (entity, swarm.tint)).collect();
     let tint_of = |slot: u32| {
-        let owner = owners.of_slot.get(slot as usize).copied().flatten();
+        let owner = world.entity_of_slot(slot);
         let tint = tints.iter().find(|(entity, _)| Some(*entity) == owner);
         tint.map_or(Tint::Id, |(_, tint)| *tint)
     };

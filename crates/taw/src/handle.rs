@@ -18,6 +18,20 @@ pub struct SensorId(pub(crate) Handle);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct BallId(pub(crate) Handle);
 
+impl BallId {
+    /// Bits of the handle, for a file or a message: [`BallId::from_bits`] makes the handle of them again.
+    #[must_use]
+    pub fn to_bits(self) -> u64 {
+        u64::from(self.0.generation) << 32 | u64::from(self.0.slot)
+    }
+
+    /// Handle with these bits. Bits that no ball has are those of a ball that is gone.
+    #[must_use]
+    pub fn from_bits(bits: u64) -> Self {
+        Self(Handle { slot: bits as u32, generation: (bits >> 32) as u32 })
+    }
+}
+
 /// Generational handle of a row that may move. The generation distinguishes it from earlier
 /// handles of the same slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -72,6 +72,7 @@ pub const TABLE: &[(&str, &str, Takes)] = &[
     ("GravityZone", ".0", Takes::Finite),
     ("WindZone", ".velocity", Takes::Finite),
     ("WindZone", ".drag", Takes::AtLeastZero),
+    ("Swarm", ".tint", Takes::All), // drawn only
     ("Gravity", ".0", Takes::Finite),
     ("SubstepDelta", ".0", Takes::All), // set before each step
 ];
@@ -135,6 +136,10 @@ fn zone(entity: &mut EntityWorldMut, zone: GravityZone) {
     entity.insert((Wall::from(Sphere::new(1.0)), zone, WindZone::default(), BELOW));
 }
 
+fn tinted(entity: &mut EntityWorldMut, tint: Tint) {
+    entity.insert((Swarm::default().with_tint(tint), BELOW));
+}
+
 const OF_MARBLES: &[&str] = &[
     "Marble",
     "Velocity",
@@ -193,6 +198,9 @@ pub fn samples() -> Vec<Sample> {
         (|it| zone(it, GravityZone::default()), &["GravityZone", "WindZone"]),
         (|it| zone(it, GravityZone::Toward(1.0)), &["GravityZone"]),
         (|it| zone(it, GravityZone::Add(Vec3::X)), &["GravityZone"]),
-    ] as [Sample; 3]);
+        (|it| tinted(it, Tint::Speed(1.0)), &["Swarm"]),
+        (|it| tinted(it, Tint::Size(0.1, 1.0)), &["Swarm"]),
+        (|it| tinted(it, Tint::Plain([0.5; 3])), &["Swarm"]),
+    ] as [Sample; 6]);
     samples
 }

@@ -16,9 +16,11 @@
 //! # }
 //! ```
 
+mod inspect;
 #[cfg(feature = "trade")]
 mod trade;
 
+pub use inspect::{Inspected, collider, layers, sensors};
 #[cfg(feature = "trade")]
 pub use trade::trade;
 
@@ -295,15 +297,25 @@ pub fn swarm_time(ui: &mut Ui, diagnostics: &DiagnosticsStore) {
     });
 }
 
-/// Switches of the gizmos.
+/// Switches of the gizmos, and sizes of those that have one.
 #[cfg(feature = "render")]
 pub fn gizmos(ui: &mut Ui, store: &mut GizmoConfigStore) {
     let (_, config) = store.config_mut::<crate::gizmos::TawGizmos>();
     ui.checkbox(&mut config.contacts, "Contacts");
     ui.checkbox(&mut config.normals, "Normals");
     ui.checkbox(&mut config.velocities, "Velocities");
+    ui.checkbox(&mut config.walls, "Walls");
     ui.checkbox(&mut config.sensors, "Sensors");
+    ui.checkbox(&mut config.sleepers, "Sleepers");
     ui.checkbox(&mut config.grid, "Grid");
+    ui.add_enabled(
+        config.normals,
+        egui::Slider::new(&mut config.normal_length, 0.01..=2.0).suffix(" m").text("normals"),
+    );
+    ui.add_enabled(
+        config.velocities,
+        egui::Slider::new(&mut config.velocity_scale, 0.01..=1.0).suffix(" s").text("velocities"),
+    );
 }
 
 fn value(diagnostics: &DiagnosticsStore, path: &DiagnosticPath) -> f64 {

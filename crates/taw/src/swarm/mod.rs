@@ -40,6 +40,7 @@ mod model;
 mod neighbours;
 mod outside_work;
 mod proxies;
+mod query;
 mod recorded_impulses;
 mod rest;
 mod rows;
@@ -60,6 +61,7 @@ pub(crate) use kernels::NearLimits;
 pub(crate) use limits::{LEAST_RADIUS, MAX_COORDINATE};
 pub use model::{Ball, Stage, SwarmModel, Tier};
 pub(crate) use proxies::Proxy;
+pub use query::{BallQueries, BallQueryHit, BallTree};
 pub(crate) use surfaces::BallSurface;
 pub(crate) use walls::StaticGeometry;
 

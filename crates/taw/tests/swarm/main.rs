@@ -7,6 +7,7 @@ mod basics;
 mod contact_data;
 mod crowding;
 mod energy;
+mod queries;
 mod settings;
 mod sleep;
 mod soft_step;
