@@ -50,16 +50,6 @@ pub(super) struct Bounce<S> {
     impact_speed: S,
 }
 
-/// Approach of a ball to a wall that it reaches within a substep.
-struct Approach<S> {
-    /// In m/s, along the normal.
-    speed: S,
-    /// In metres, not less than zero.
-    separation: S,
-    /// Acceleration towards the wall, in m/s².
-    gravity: S,
-}
-
 /// Separation in radii, and in roundings of the coordinates, up to which a ball stands on a wall. A
 /// larger one would hold balls in the air that come down beside others.
 const TOUCHES: f64 = 1e-4;
@@ -213,23 +203,28 @@ impl<S: Scalar> WallContact<S> {
         None
     }
 
-    /// Finds out if the ball comes to the wall within a substep.
+    /// Finds out if the ball meets the wall within a substep, fast enough to bounce.
     fn approach(
         &self,
         params: &SolverParams<S>,
         at: &Row<S>,
         velocity: &Row<S>,
-    ) -> Option<Approach<S>> {
+    ) -> Option<Bounce<S>> {
         let speed = -(xyz(velocity) - self.surface).dot(self.normal);
         let separation = self.separation(at).max(S::zero());
         // Gravity works on the ball as far as it comes nearer. As far as the contact reaches, by the
         // velocity after gravity: one that only stops the ball would take its bounce.
         let gravity = -xyz(&params.gravity).dot(self.normal);
         let nearer = (speed + gravity * params.time) * params.time;
-        (speed > S::zero() && separation < nearer).then_some(Approach {
-            speed,
+        if speed <= S::zero() || separation >= nearer {
+            return None;
+        }
+        let square = speed * speed + S::from_f64(2.0) * gravity * separation;
+        let impact_speed = square.max(S::zero()).sqrt();
+        (impact_speed > params.restitution_threshold).then_some(Bounce {
             separation,
-            gravity,
+            approach_speed: speed,
+            impact_speed,
         })
     }
 
@@ -243,8 +238,7 @@ impl<S: Scalar> WallContact<S> {
         (at, velocity, filter): (&Row<S>, &Row<S>, CollisionFilter),
         before_end: S,
     ) {
-        let approach = self.approach(params, at, velocity);
-        if approach.is_none_or(|approach| approach.speed <= params.restitution_threshold) {
+        if self.approach(params, at, velocity).is_none() {
             return;
         }
         let time = params.time;
@@ -264,25 +258,15 @@ impl<S: Scalar> WallContact<S> {
         }
     }
 
-    /// Finds out if the ball meets the wall within a substep, fast enough to bounce.
+    /// Finds out if the ball meets the wall within a substep, fast enough to bounce, and does.
     pub fn bounce(
         &self,
         params: &SolverParams<S>,
         at: &Row<S>,
         velocity: &Row<S>,
     ) -> Option<Bounce<S>> {
-        if self.numbers.restitution == S::zero() {
-            return None;
-        }
-        let Approach { speed: approach_speed, separation, gravity } =
-            self.approach(params, at, velocity)?;
-        let square = approach_speed * approach_speed + S::from_f64(2.0) * gravity * separation;
-        let impact_speed = square.max(S::zero()).sqrt();
-        (impact_speed > params.restitution_threshold).then_some(Bounce {
-            separation,
-            approach_speed,
-            impact_speed,
-        })
+        let bounces = self.numbers.restitution > S::zero();
+        bounces.then(|| self.approach(params, at, velocity)).flatten()
     }
 
     /// Impact of such a bounce, of a ball with this center, velocity and spin before it, and this velocity

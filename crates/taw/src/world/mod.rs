@@ -11,6 +11,7 @@ mod energy;
 mod energy_audit;
 mod event_driven;
 mod external_forces;
+mod first_touch;
 mod ignored;
 mod impulse;
 mod integrate;

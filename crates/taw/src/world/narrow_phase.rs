@@ -383,21 +383,27 @@ pub(super) fn remove_ghost_collisions<S: Scalar>(
     let before = |x: &Candidate<S>, y: &Candidate<S>| {
         (x.nearest.distance, x.part) < (y.nearest.distance, y.part)
     };
-    let ghosts = |it: &Candidate<S>| {
+    let is_hidden = |it: &Candidate<S>| {
+        let mut planes = walls.colliding_planes(filter);
+        is_buried(it) || planes.any(|(_, plane)| plane.signed_distance(it.nearest.point) <= flush)
+    };
+    let is_ghost = |it: &Candidate<S>| {
         let point = it.nearest.point;
         let is_near = |bounds: &Option<Aabb3<S>>| bounds.is_none_or(|it| it.contains_point(point));
         let near = candidates.iter().zip(&boxes).filter(|(_, bounds)| is_near(bounds));
-        let others = near.map(|(other, _)| other).filter(|other| other.part != it.part);
-        let mut planes = walls.colliding_planes(filter);
-        let mut on_planes =
-            || planes.any(|(_, plane)| plane.signed_distance(it.nearest.point) <= flush);
+        let mut others = near.map(|(other, _)| other).filter(|other| other.part != it.part);
         let covers = |other: &Candidate<S>| on(it, other) && (before(other, it) || !on(other, it));
-        others.into_iter().any(covers) || is_buried(it) || on_planes()
+        others.any(covers) || is_hidden(it)
     };
-    let ghosts: Vec<bool> = candidates.iter().map(ghosts).collect();
-    let mut row = 0;
-    candidates.retain(|_| {
-        row += 1;
-        !ghosts[row - 1]
-    });
+    let mut ghosts: SmallVec<[bool; 8]> = candidates.iter().map(is_ghost).collect();
+    if ghosts.iter().all(|is_ghost| *is_ghost) {
+        // Around a corner, each may lie on the next one, and none on all others: one of them touches.
+        let open = (0..candidates.len()).filter(|i| !is_hidden(&candidates[*i]));
+        let order = |i: &usize| (candidates[*i].nearest.distance, candidates[*i].part);
+        if let Some(i) = open.reduce(|a, b| if order(&b) < order(&a) { b } else { a }) {
+            ghosts[i] = false;
+        }
+    }
+    let mut ghosts = ghosts.into_iter();
+    candidates.retain(|_| ghosts.next() == Some(false));
 }

@@ -13,7 +13,7 @@ use crate::shape::{Aabb, Aabb3, BoundedShape, PointProjection, Sphere};
 use crate::swarm::{MAX_COORDINATE, StaticGeometry};
 
 /// Overlap in radii at the end of a path up to which a ball only grazes a wall.
-const GRAZES: f64 = 0.02;
+pub(super) const GRAZES: f64 = 0.02;
 
 /// Radius of a ball's core, over its own: what a surface never passes.
 const CORE: f64 = 0.5;
@@ -24,8 +24,8 @@ const CORE: f64 = 0.5;
 /// wide, that says little: the ball may be beyond it by then. So it is met on the ball's path as the wall
 /// sees it.
 pub(crate) struct SweptWalls<'a, S> {
-    walls: &'a Walls<S>,
-    moving: Vec<MovingWall<S>>,
+    pub(super) walls: &'a Walls<S>,
+    pub(super) moving: Vec<MovingWall<S>>,
     /// Length of the step, in seconds.
     dt: S,
 }
@@ -100,64 +100,6 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
         for Candidate { part, .. } in near {
             visit_at(part, ball.center, S::zero());
         }
-    }
-
-    /// Plane that a part is like for a ball with its center at a place: its normal, and the distance of the
-    /// ball, where it is now, from that plane as it is at the end of the step. Given is how a wall that
-    /// moves does, and how long before the end of the step the ball is there, in seconds.
-    fn plane_at(
-        &self,
-        part: SubShape,
-        (ball, place): (&Sphere<S>, Point3<S>),
-        motion: Option<(WallMotion<S>, S)>,
-    ) -> (Vec3<S>, S) {
-        let (normal, distance, surface_way) = match motion {
-            None => {
-                let PointProjection { normal, distance, .. } =
-                    self.walls.project_point(part, place);
-                (normal, distance, S::zero())
-            }
-            Some((motion, before)) => {
-                let pose = motion.pose_before(before);
-                let nearest = self.walls.project_point(part, pose.inverse_transform_point(place));
-                let normal = pose.rotation * nearest.normal;
-                let surface = motion.velocity_at(ball.center - normal * ball.radius);
-                (normal, nearest.distance, surface.dot(normal) * before)
-            }
-        };
-        (normal, distance + (ball.center - place).dot(normal) - surface_way)
-    }
-
-    /// First part that a ball meets on a path of those that it touches where it meets this one, if others cover
-    /// that there: at an edge between two triangles of a mesh, say, on which only one of them lists the ball. None
-    /// if half-spaces cover all. Given is the ball as it touches the part, of a wall that moves in its frame.
-    fn uncovered_part(
-        &self,
-        part: SubShape,
-        touching: &Sphere<S>,
-        filter: CollisionFilter,
-        path: &RelativePath<S>,
-    ) -> Option<(S, SubShape)> {
-        let time_of =
-            |part| Some((self.walls.time_of_impact(part, touching.radius, path)?.time, part));
-        let (mut near, reach) = (Vec::new(), touching.radius * S::from_f64(GRAZES));
-        candidate_sub_shapes(self.walls, (touching, filter), reach, &mut near);
-        if !matches!(path.frame, Frame::Standing) {
-            near.retain(|it| it.part.wall == part.wall);
-        }
-        let has_it = |near: &[Candidate<S>]| near.iter().any(|it| it.part == part);
-        if near.len() > 1 && has_it(&near) {
-            let touched: Vec<_> = near.iter().map(|it| it.part).collect();
-            remove_ghost_collisions(self.walls, (touching, filter), &mut near);
-            if near.is_empty() {
-                return None;
-            }
-            if !has_it(&near) {
-                let of_touched = touched.into_iter().filter_map(time_of);
-                return of_touched.min_by(|(a, _), (b, _)| a.total_cmp(b));
-            }
-        }
-        time_of(part)
     }
 
     /// Time at which a sphere meets the first part that it passes into on a path, as a fraction of
@@ -378,26 +320,15 @@ impl<S: Scalar> StaticGeometry<S> for SweptWalls<'_, S> {
         displacement: Vec3<S>,
         [before, time]: [S; 2],
     ) -> Option<(Vec3<S>, S)> {
-        let (ball, part) = (sphere(*ball), SubShape { wall, index });
+        let ball = sphere(*ball);
         let moving = self.moving.binary_search_by_key(&wall, |wall| wall.row).ok();
-        let motion = moving.map(|i| self.moving[i].motion);
-        // Of a wall that moves, up to the end of the step, since that is where it is known.
-        let (ways, frame) = match motion {
-            None => (S::one(), Frame::Standing),
-            Some(motion) => (before / time, Frame::Moving(motion, before)),
-        };
-        let path = RelativePath { start: ball.center, displacement: displacement * ways, frame };
-        let hit = self.walls.time_of_impact(part, ball.radius, &path);
-        let (at, part) = match hit.filter(|hit| hit.time * ways < S::one()) {
-            Some(hit) => {
-                let touching = Sphere { center: path.at(hit.time), ..ball };
-                let (time, part) = self.uncovered_part(part, &touching, filter, &path)?;
-                (time * ways, part)
-            }
-            None => (S::one(), part),
+        let moving = moving.map(|i| &self.moving[i]);
+        let (at, part) = match self.touch((&ball, filter), (displacement, [before, time]), moving) {
+            Some((at, part)) => (at, part?),
+            None => (S::one(), SubShape { wall, index }),
         };
         let place = ball.center + displacement * at;
-        let motion = motion.map(|motion| (motion, before - time * at));
+        let motion = moving.map(|wall| (wall.motion, before - time * at));
         let (normal, distance) = self.plane_at(part, (&ball, place), motion);
         Some((normal, not_beyond(distance)))
     }

@@ -108,3 +108,63 @@ fn a_random_glancing_bounce_leaves_as_geometry_says() {
     let worst = [worst_angle::<f32>(1_000), worst_angle::<f64>(1_000)];
     assert!(worst.iter().all(|angle| *angle < 0.1), "{worst:?}");
 }
+
+/// Floor at height zero: a half-space, flush boxes, or a mesh of triangles, with cells of this width.
+fn insert_floor(world: &mut World<f32>, kind: usize, cell: f32) {
+    let count = 24_u16;
+    let along = |i: u16| (f32::from(i) - f32::from(count / 2)) * cell;
+    if kind == 0 {
+        world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+    } else if kind == 1 {
+        for (i, j) in (0..count).flat_map(|i| (0..count).map(move |j| (i, j))) {
+            let (min, max) = ([along(i), -1.0, along(j)], [along(i + 1), 0.0, along(j + 1)]);
+            world.walls.insert(Aabb { min: min.into(), max: max.into() }).unwrap();
+        }
+    } else {
+        let side = 0..=count;
+        let corners = side.clone().flat_map(|i| side.clone().map(move |j| [i, j]));
+        let corners = corners.map(|[i, j]| Point3::new(along(i), 0.0, along(j))).collect();
+        let row = u32::from(count) + 1;
+        let cells = (0..row - 1).flat_map(|i| (0..row - 1).map(move |j| i * row + j));
+        let halves = |a: u32| [[a, a + 1, a + row], [a + 1, a + row + 1, a + row]];
+        world.walls.insert(Mesh::new(corners, cells.flat_map(halves).collect()).unwrap()).unwrap();
+    }
+}
+
+/// A marble that was listed over one tile and comes down on the next one bounced off the edge between them.
+#[test]
+fn a_random_bounce_on_flush_tiles_is_one_on_a_floor() {
+    let mut random = fastrand::Rng::with_seed(3);
+    for number in 0..2_000 {
+        let radius = 0.02 + 0.3 * random.f64() * random.f64();
+        let cell = (radius * (0.3 + 4.0 * random.f64())) as f32;
+        let (speed, down) = (1.0 + 9.0 * random.f64(), 0.05 + 0.9 * random.f64());
+        let (turn, e) = (std::f64::consts::TAU * random.f64(), 0.2 + 0.8 * random.f64());
+        let side = (1.0 - down * down).sqrt();
+        let velocity = [side * turn.cos(), -down, side * turn.sin()].map(|v| v * speed);
+        let dt = [1.0 / 30.0, 1.0 / 60.0, 1.0 / 64.0, 1.0 / 240.0][random.usize(0..4)];
+        let time = dt * (1.0 + 2.0 * random.f64());
+        let from = velocity.map(|v| -v * time);
+        let substeps = 1 << random.u32(0..4);
+        let mut after = [0, 1 + number % 2].map(|kind| {
+            let mut world = world::<f32>(substeps);
+            world.set_gravity(Vec3::zero()).unwrap();
+            insert_floor(&mut world, kind, cell);
+            let place = [from[0], radius + from[1], from[2]];
+            world.marbles.insert(ball(place, velocity, radius, e)).unwrap();
+            world
+        });
+        for _ in 0..8 {
+            for world in &mut after {
+                world.step(dt as f32).unwrap();
+            }
+            let place = after[0].marbles.position()[0];
+            if place.x.abs().max(place.z.abs()) > 11.0 * cell {
+                break; // there the tiles end
+            }
+            let [floor, tiles] = after.each_ref().map(|world| world.marbles.velocity()[0]);
+            let off = (floor - tiles).magnitude() / speed as f32;
+            assert!(off < 1e-3, "{number}: {off}, {floor:?} {tiles:?}");
+        }
+    }
+}
