@@ -230,32 +230,31 @@ impl<S: Scalar> WallContact<S> {
 
     /// Puts the plane where the ball first touches the wall on its way in a substep, if it comes fast: by
     /// then, the point of a round wall or of an edge that is nearest to it is another one. So long before
-    /// the end of the step the substep begins, in seconds.
+    /// the end of the step the substep begins, in seconds. Returns that way.
     pub fn look_ahead(
         &mut self,
         walls: &dyn StaticGeometry<S>,
         params: &SolverParams<S>,
         (at, velocity, filter): (&Row<S>, &Row<S>, CollisionFilter),
         before_end: S,
-    ) {
-        if self.approach(params, at, velocity).is_none() {
-            return;
-        }
+    ) -> Option<(Vec3<S>, [S; 2])> {
+        self.approach(params, at, velocity)?;
         let time = params.time;
-        let way = xyz(velocity) * time + xyz(&params.gravity) * (time * time);
-        let part = [self.wall, self.part];
+        let displacement = xyz(velocity) * time + xyz(&params.gravity) * (time * time);
+        let way = (displacement, [before_end, time]);
         if let Some((normal, distance)) =
-            walls.plane_on_way(part, at, filter, way, [before_end, time])
+            walls.plane_on_way([self.wall, self.part], at, filter, way)
         {
             self.normal = normal;
             self.offset_at_end = normal.dot(xyz(at)) - distance;
             self.set_time(walls, at, before_end);
         } else {
             // Beyond what the ball reaches.
-            let beyond = way.magnitude() + at[3];
+            let beyond = displacement.magnitude() + at[3];
             self.offset_at_end -= beyond;
             self.offset -= beyond;
         }
+        Some(way)
     }
 
     /// Finds out if the ball meets the wall within a substep, fast enough to bounce, and does.

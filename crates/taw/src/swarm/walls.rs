@@ -62,16 +62,22 @@ pub(crate) trait StaticGeometry<S>: Sync {
     );
     /// Plane that a part is like where a ball first touches it on its way, or else where that ends: its
     /// normal, and the distance of the center, where it is now, from that plane as it is at the end of the
-    /// step. Where others cover the part, that of what the ball first touches; none if half-spaces do. The times are
-    /// what is left of the step and what the way takes, in seconds.
+    /// step. Where another part covers it, the plane of that; none if half-spaces do. The way is a displacement in
+    /// metres; the times are what is left of the step and what the way takes, in seconds.
     fn plane_on_way(
         &self,
         part: [u32; 2],
         ball: &Row<S>,
         filter: CollisionFilter,
-        displacement: Vec3<S>,
-        times: [S; 2],
+        way: (Vec3<S>, [S; 2]),
     ) -> Option<(Vec3<S>, S)>;
+    /// Part that a ball first touches on its way, and the plane that it is like there, likewise.
+    fn first_touch(
+        &self,
+        ball: &Row<S>,
+        filter: CollisionFilter,
+        way: (Vec3<S>, [S; 2]),
+    ) -> Option<([u32; 2], Vec3<S>, S)>;
     /// Center, in metres, at which a ball ends that surfaces stop on its way between two places; none if
     /// none stops it. `before_end` holds the times of both places, in seconds before the end of the step.
     fn stop_passage(
@@ -432,7 +438,7 @@ pub(super) fn near_shapes<S: Scalar>(
 }
 
 impl<S: Scalar> WallContact<S> {
-    fn new(
+    pub(super) fn new(
         row: u32,
         [wall, part]: [u32; 2],
         normal: Vec3<S>,

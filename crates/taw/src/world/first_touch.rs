@@ -4,7 +4,7 @@ use cgmath::InnerSpace;
 
 use super::continuous::{Frame, MovingWall, RelativePath};
 use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisions};
-use super::swept_walls::{GRAZES, SweptWalls};
+use super::swept_walls::{GRAZES, SweptWalls, not_beyond};
 use super::walls::SubShape;
 use crate::broad::CollisionFilter;
 use crate::math::{Point3, Scalar, Vec3};
@@ -67,28 +67,76 @@ impl<S: Scalar> SweptWalls<'_, S> {
         first
     }
 
-    /// Place at which a ball first touches a wall that moves, or else one that stands, as a fraction of its way, and
-    /// what it touches there; none if half-spaces cover that. The times are what is left of the
-    /// step and what the way takes, in seconds.
-    pub(super) fn touch(
-        &self,
-        (ball, filter): (&Sphere<S>, CollisionFilter),
+    /// Path of a ball as a wall that moves sees it, or those that stand; and how often its way goes into it. The
+    /// times are what is left of the step and what the way takes, in seconds.
+    fn path(
+        ball: &Sphere<S>,
         (displacement, [before, time]): (Vec3<S>, [S; 2]),
         moving: Option<&MovingWall<S>>,
-    ) -> Option<(S, Option<SubShape>)> {
+    ) -> (RelativePath<S>, S) {
         // Of a wall that moves, up to the end of the step, since that is where it is known.
         let (ways, frame) = match moving {
             None => (S::one(), Frame::Standing),
             Some(wall) => (before / time, Frame::Moving(wall.motion, before)),
         };
-        let path = RelativePath { start: ball.center, displacement: displacement * ways, frame };
-        let (at, first) = self.first_touched((ball, filter), &path, moving)?;
-        if at * ways >= S::one() {
-            return None;
-        }
-        let touching = Sphere { center: path.at(at), ..*ball };
-        let part = self.uncovered_part(first, (&touching, filter), moving.is_some());
-        Some((at * ways, part))
+        (RelativePath { start: ball.center, displacement: displacement * ways, frame }, ways)
+    }
+
+    /// Plane where a ball touches a part, or where its way ends: see
+    /// [`StaticGeometry::plane_on_way`](crate::swarm::StaticGeometry::plane_on_way).
+    pub(super) fn plane_of_part(
+        &self,
+        part: SubShape,
+        (ball, filter): (&Sphere<S>, CollisionFilter),
+        way: (Vec3<S>, [S; 2]),
+    ) -> Option<(Vec3<S>, S)> {
+        let moving = self.moving.binary_search_by_key(&part.wall, |wall| wall.row).ok();
+        let moving = moving.map(|i| &self.moving[i]);
+        let (path, ways) = Self::path(ball, way, moving);
+        let hit = self.walls.time_of_impact(part, ball.radius, &path);
+        let (at, part) = match hit.filter(|hit| hit.time * ways < S::one()) {
+            Some(hit) => {
+                let touching = Sphere { center: path.at(hit.time), ..*ball };
+                let part = self.uncovered_part(part, (&touching, filter), moving.is_some())?;
+                (hit.time * ways, part)
+            }
+            None => (S::one(), part),
+        };
+        Some(self.plane_on(part, ball, (at, way), moving))
+    }
+
+    /// The part that a ball first touches on its way, and the plane that it is like there.
+    pub(super) fn first_part(
+        &self,
+        (ball, filter): (&Sphere<S>, CollisionFilter),
+        way: (Vec3<S>, [S; 2]),
+    ) -> Option<(SubShape, Vec3<S>, S)> {
+        let moving = self.moving.iter().filter(|wall| !self.outruns(wall, ball));
+        let all = std::iter::once(None).chain(moving.map(Some));
+        let touches = all.filter_map(|moving| {
+            let (path, ways) = Self::path(ball, way, moving);
+            let (time, part) = self.first_touched((ball, filter), &path, moving)?;
+            let touching = Sphere { center: path.at(time), ..*ball };
+            let part = self.uncovered_part(part, (&touching, filter), moving.is_some())?;
+            (time * ways < S::one()).then_some((time * ways, part, moving))
+        });
+        let (at, part, moving) = touches.min_by(|(a, ..), (b, ..)| a.total_cmp(b))?;
+        let (normal, distance) = self.plane_on(part, ball, (at, way), moving);
+        Some((part, normal, distance))
+    }
+
+    /// Plane that a part is like for a ball at a fraction of its way: see [`Self::plane_at`].
+    fn plane_on(
+        &self,
+        part: SubShape,
+        ball: &Sphere<S>,
+        (at, (displacement, [before, time])): (S, (Vec3<S>, [S; 2])),
+        moving: Option<&MovingWall<S>>,
+    ) -> (Vec3<S>, S) {
+        let place = ball.center + displacement * at;
+        let motion = moving.map(|wall| (wall.motion, before - time * at));
+        let (normal, distance) = self.plane_at(part, (ball, place), motion);
+        (normal, not_beyond(distance))
     }
 
     /// The part that a ball touches, or another one that covers it there: at an edge between two triangles of a

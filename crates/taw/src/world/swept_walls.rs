@@ -46,7 +46,7 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
     }
 
     /// Returns true if a wall goes so far in the step that it may pass a ball there.
-    fn outruns(&self, wall: &MovingWall<S>, ball: &Sphere<S>) -> bool {
+    pub(super) fn outruns(&self, wall: &MovingWall<S>, ball: &Sphere<S>) -> bool {
         self.way_of(wall, ball) > ball.radius * S::from_f64(MAX_FREE_MOTION)
     }
 
@@ -317,20 +317,19 @@ impl<S: Scalar> StaticGeometry<S> for SweptWalls<'_, S> {
         [wall, index]: [u32; 2],
         ball: &[S; 4],
         filter: CollisionFilter,
-        displacement: Vec3<S>,
-        [before, time]: [S; 2],
+        way: (Vec3<S>, [S; 2]),
     ) -> Option<(Vec3<S>, S)> {
-        let ball = sphere(*ball);
-        let moving = self.moving.binary_search_by_key(&wall, |wall| wall.row).ok();
-        let moving = moving.map(|i| &self.moving[i]);
-        let (at, part) = match self.touch((&ball, filter), (displacement, [before, time]), moving) {
-            Some((at, part)) => (at, part?),
-            None => (S::one(), SubShape { wall, index }),
-        };
-        let place = ball.center + displacement * at;
-        let motion = moving.map(|wall| (wall.motion, before - time * at));
-        let (normal, distance) = self.plane_at(part, (&ball, place), motion);
-        Some((normal, not_beyond(distance)))
+        self.plane_of_part(SubShape { wall, index }, (&sphere(*ball), filter), way)
+    }
+
+    fn first_touch(
+        &self,
+        ball: &[S; 4],
+        filter: CollisionFilter,
+        way: (Vec3<S>, [S; 2]),
+    ) -> Option<([u32; 2], Vec3<S>, S)> {
+        let (part, normal, distance) = self.first_part((&sphere(*ball), filter), way)?;
+        Some(([part.wall, part.index], normal, distance))
     }
 
     fn stop_passage(
@@ -395,7 +394,7 @@ const FARTHEST: f64 = 1e15;
 
 /// A distance or an offset, in metres. What is no number, as of walls that move too fast for numbers,
 /// is far away.
-fn not_beyond<S: Scalar>(x: S) -> S {
+pub(super) fn not_beyond<S: Scalar>(x: S) -> S {
     let farthest = S::from_f64(FARTHEST);
     if x.is_nan() { farthest } else { x.clamp(-farthest, farthest) }
 }

@@ -9,8 +9,9 @@ use crate::swarm::batches::Batch;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::fast_movers::FastMovers;
 use crate::swarm::kernels::{Pass, SolverParams, squared};
-use crate::swarm::surfaces::SurfaceOf;
-use crate::swarm::wall_contact::xyz;
+use crate::swarm::surfaces::{SurfaceOf, WallNumbers};
+use crate::swarm::wall_contact::{WallContact, xyz};
+use crate::swarm::walls::find;
 use crate::swarm::{Stage, StaticGeometry, Swarm};
 use crate::workers::{DisjointSlice, parallel_for};
 
@@ -152,7 +153,7 @@ impl<S: Scalar> Swarm<S> {
         }
         let (slots, model) = (self.ids.slots(), self.model.material);
         let surfaces = SurfaceOf { model, surfaces: &self.surfaces, slots };
-        let (at, velocity, count) = (&self.at[..], &self.velocity[..], self.chunks.len());
+        let (balls, velocity, count) = (&self.at[..], &self.velocity[..], self.chunks.len());
         let chunks = DisjointSlice::new(&mut self.chunks);
         parallel_for(self.scratch.threads, count, |_, i| {
             // SAFETY: its own. Nobody changes speeds meanwhile.
@@ -160,13 +161,35 @@ impl<S: Scalar> Swarm<S> {
             if chunk.asleep || !which(chunk) || !faster(chunk, S::zero()) {
                 return;
             }
+            let ball = |row: u32| {
+                let at = row as usize;
+                (&balls[at], &velocity[at], surfaces.filter(row))
+            };
+            let mut new = Vec::new();
             for contact in &mut chunk.wall_contacts {
-                let row = contact.row as usize;
-                if !contact.is_plane && !contact.bears_proxy && !velocity[row][3].is_sign_negative()
-                {
-                    let ball = (&at[row], &velocity[row], surfaces.filter(row as u32));
-                    contact.look_ahead(walls, params, ball, left);
+                let row = contact.row;
+                let is_asleep = velocity[row as usize][3].is_sign_negative();
+                if contact.is_plane || contact.bears_proxy || is_asleep {
+                    continue;
                 }
+                let (at, _, filter) = ball(row);
+                let way = contact.look_ahead(walls, params, ball(row), left);
+                // Another part may come first, which was no contact where the step began.
+                let first = way.and_then(|way| walls.first_touch(at, filter, way));
+                if let Some((part, normal, distance)) = first {
+                    let numbers = WallNumbers::new(surfaces.row(row), walls.material(part[0]));
+                    let offset = normal.dot(xyz(at)) - distance;
+                    let mut touched = WallContact::new(row, part, normal, offset, numbers);
+                    touched.is_plane = false;
+                    touched.set_time(walls, at, left);
+                    new.push(touched);
+                }
+            }
+            new.retain(|contact| find(&chunk.wall_contacts, contact).is_none());
+            if !new.is_empty() {
+                chunk.wall_contacts.append(&mut new);
+                chunk.wall_contacts.sort_unstable_by_key(WallContact::key);
+                chunk.wall_contacts.dedup_by_key(|contact| contact.key());
             }
         });
     }
