@@ -88,6 +88,8 @@ pub(super) struct WallQuery<'a, S> {
     pub before: S,
     /// Lengths of a step and of a substep, in seconds.
     pub times: [S; 2],
+    /// Surfaces as far away as a fast ball goes are found, too, not only those that it may pass.
+    pub whole_way: bool,
     pub gravity: Vec3<S>,
 }
 
@@ -108,6 +110,31 @@ impl<S: Scalar> WallQuery<'_, S> {
         let [step, substep] = self.ways(row);
         let far = S::from_f64(FAST) * self.at[row as usize][3];
         (step.magnitude2() > far * far).then_some(substep)
+    }
+
+    /// Distance within which surfaces at a fast ball are found, in metres. Those that are further away are
+    /// met on its way, if at all, and the planes that they are like here would be in its way.
+    pub fn reach(&self, radius: S, displacement: Vec3<S>) -> S {
+        let way = displacement.magnitude();
+        if self.whole_way { way } else { way.min(S::from_f64(FAST) * radius) }
+    }
+
+    /// Visits the walls that a fast ball meets on its way in a substep, and along those that it met.
+    pub fn visit_way(
+        &self,
+        walls: &dyn StaticGeometry<S>,
+        (ball, filter): (&Row<S>, CollisionFilter),
+        displacement: Vec3<S>,
+        visit: &mut impl FnMut(&Row<S>, [u32; 2], Vec3<S>, S),
+    ) {
+        if self.tier == Tier::Full {
+            let way = (displacement, [self.before, self.times[1]]);
+            if let Some((part, normal, distance)) = walls.first_touch(ball, filter, way) {
+                visit(ball, part, normal, distance);
+            }
+        }
+        let shortest = S::from_f64(FAST) * ball[3];
+        along_path(walls, (ball, filter), displacement, shortest, visit);
     }
 
     /// Returns true if a wall may pass a ball within the step.

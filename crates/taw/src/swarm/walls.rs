@@ -8,7 +8,7 @@ use super::kernels::squared;
 use super::proxies::Proxy;
 use super::surfaces::{SurfaceOf, WallNumbers};
 use super::wall_contact::WallContact;
-use super::wall_paths::{FAST, WallQuery, along_path};
+use super::wall_paths::WallQuery;
 use crate::broad::{CollisionFilter, CollisionLayers};
 use crate::constraint::ContactImpulse;
 use crate::math::{Kernel, LANES, Point3, Row, Scalar, Simd, SimdLevel, Vec3, is_finite};
@@ -290,14 +290,8 @@ impl<S: Scalar> Chunk<S> {
             }
             let mut reach = query.skin_left[*row as usize].max(S::zero());
             if let Some(displacement) = displacement {
-                reach = displacement.magnitude();
-                along_path(
-                    walls,
-                    (ball, filter),
-                    displacement,
-                    S::from_f64(FAST) * ball[3],
-                    &mut visit,
-                );
+                reach = query.reach(ball[3], displacement);
+                query.visit_way(walls, (ball, filter), displacement, &mut visit);
             }
             walls.shapes_at(ball, filter, reach, &mut |part, normal, distance| {
                 visit(ball, part, normal, distance);

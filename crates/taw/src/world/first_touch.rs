@@ -59,7 +59,7 @@ impl<S: Scalar> SweptWalls<'_, S> {
             let end = Sphere { center: path.at(S::one()), ..*ball };
             let reached = ball.bounding_box().union(&end.bounding_box());
             self.walls.for_each_colliding(&reached, filter, |part| {
-                if self.moving.binary_search_by_key(&part.wall, |wall| wall.row).is_err() {
+                if self.stands(part.wall) {
                     visit(part);
                 }
             });
@@ -140,7 +140,8 @@ impl<S: Scalar> SweptWalls<'_, S> {
     }
 
     /// The part that a ball touches, or another one that covers it there: at an edge between two triangles of a
-    /// mesh, only one of them is a contact. None if half-spaces cover it. Of a wall that moves, in its frame.
+    /// mesh, only one of them is a contact. None if half-spaces cover it. Of a wall that moves, in its frame, in which
+    /// nobody knows where others are.
     fn uncovered_part(
         &self,
         part: SubShape,
@@ -149,7 +150,7 @@ impl<S: Scalar> SweptWalls<'_, S> {
     ) -> Option<SubShape> {
         let (mut near, reach) = (Vec::new(), touching.radius * S::from_f64(GRAZES));
         candidate_sub_shapes(self.walls, (touching, filter), reach, &mut near);
-        near.retain(|it| !moves || it.part.wall == part.wall);
+        near.retain(|it| it.part.wall == part.wall || !moves && self.stands(it.part.wall));
         let has_it = |near: &[Candidate<S>]| near.iter().any(|it| it.part == part);
         if near.len() > 1 && has_it(&near) {
             remove_ghost_collisions(self.walls, (touching, filter), &mut near);
@@ -160,5 +161,9 @@ impl<S: Scalar> SweptWalls<'_, S> {
             }
         }
         Some(part)
+    }
+
+    fn stands(&self, row: u32) -> bool {
+        self.moving.binary_search_by_key(&row, |wall| wall.row).is_err()
     }
 }

@@ -199,7 +199,7 @@ impl<S: Scalar> Swarm<S> {
         dt: S,
     ) {
         if walls.has_shapes() || walls_changed {
-            self.update_wall_contacts(walls, dt, [dt, dt], |_| true, !walls_changed);
+            self.update_contacts_of(walls, dt, [dt, dt], |_| true, [!walls_changed, true]);
         }
     }
 
@@ -212,6 +212,17 @@ impl<S: Scalar> Swarm<S> {
         times: [S; 2],
         which: impl Fn(&Chunk<S>) -> bool + Sync,
         only_fast: bool,
+    ) {
+        self.update_contacts_of(walls, before, times, which, [only_fast, false]);
+    }
+
+    fn update_contacts_of(
+        &mut self,
+        walls: &dyn StaticGeometry<S>,
+        before: S,
+        times: [S; 2],
+        which: impl Fn(&Chunk<S>) -> bool + Sync,
+        [only_fast, whole_way]: [bool; 2],
     ) {
         let (proxies, rows) = (&self.proxies[..], &self.scratch.proxy_rows[..]);
         let query = WallQuery {
@@ -226,6 +237,7 @@ impl<S: Scalar> Swarm<S> {
             },
             before,
             times,
+            whole_way,
             gravity: self.gravity.unwrap_or_else(Vec3::zero),
         };
         let chunks = DisjointSlice::new(&mut self.chunks);
