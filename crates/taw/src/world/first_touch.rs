@@ -13,8 +13,8 @@ use crate::shape::{BoundedShape, PointProjection, Sphere};
 
 impl<S: Scalar> SweptWalls<'_, S> {
     /// Plane that a part is like for a ball with its center at a place: its normal, and the distance of the
-    /// ball, where it is now, from that plane as it is at the end of the step. Given is how a wall that
-    /// moves does, and how long before the end of the step the ball is there, in seconds.
+    /// ball, where it is now, from that plane as it is at the end of the step. `motion` is that of a wall that
+    /// moves, and how long before the end of the step the ball is at the place, in seconds.
     pub(super) fn plane_at(
         &self,
         part: SubShape,
@@ -67,8 +67,8 @@ impl<S: Scalar> SweptWalls<'_, S> {
         first
     }
 
-    /// Path of a ball as a wall that moves sees it, or those that stand; and how often its way goes into it. The
-    /// times are what is left of the step and what the way takes, in seconds.
+    /// Path of a ball in the frame of a wall that moves, or of those that stand, and its length over that of the
+    /// way. The times are what is left of the step and what the way takes, in seconds.
     fn path(
         ball: &Sphere<S>,
         (displacement, [before, time]): (Vec3<S>, [S; 2]),
