@@ -5,6 +5,7 @@ use cgmath::{InnerSpace, Zero};
 use super::{BallRotation, InverseEffectiveMass};
 use crate::broad::Period;
 use crate::math::{Point3, Scalar, Vec3};
+use crate::motion::BALL_INERTIA;
 
 /// Columns of the bodies that a solver works on; all of one length.
 #[derive(Debug)]
@@ -48,11 +49,12 @@ impl<S: Scalar> CapsuleInertia<S> {
         // Fractions of the mass: the cylinder has volume π r² 2 h, the two hemispheres 4/3 π r³.
         let cylinder = half_length / (half_length + radius * number(2.0 / 3.0));
         let ends = S::one() - cylinder;
-        let axial = cylinder * squared * number(0.5) + ends * squared * number(0.4);
+        let axial = cylinder * squared * number(0.5) + ends * squared * number(BALL_INERTIA);
         // The centroid of a hemisphere is 3/8 r from its flat side (Steiner).
         let cylinder_transverse = squared * number(0.25) + half_length * half_length / number(3.0);
-        let ends_transverse =
-            squared * number(0.4) + half_length * half_length + half_length * radius * number(0.75);
+        let ends_transverse = squared * number(BALL_INERTIA)
+            + half_length * half_length
+            + half_length * radius * number(0.75);
         [axial, cylinder * cylinder_transverse + ends * ends_transverse]
     }
 

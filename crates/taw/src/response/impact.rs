@@ -2,6 +2,7 @@ use cgmath::{InnerSpace, Zero};
 
 use crate::contact::ContactMaterial;
 use crate::math::{RealVector, Scalar, Vec3};
+use crate::motion::BALL_INVERSE_INERTIA;
 
 /// Inverse effective mass of a contact: change of the relative velocity of its two points per
 /// impulse, in 1/kg (the diagonal of `K` in constraint solvers).
@@ -57,7 +58,7 @@ impl BallRotation {
     pub(super) fn inverse_inertia_factor<S: Scalar>(self) -> S {
         match self {
             Self::Locked => S::zero(),
-            Self::Free => S::from_f64(2.5),
+            Self::Free => S::from_f64(BALL_INVERSE_INERTIA),
         }
     }
 }

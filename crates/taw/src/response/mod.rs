@@ -143,4 +143,29 @@ impl Response {
     pub(crate) fn needs_penetration(self) -> bool {
         matches!(self, Self::Penalty(_))
     }
+
+    /// True if marbles are rows of the swarm's solver, which finds its own contacts and substeps.
+    pub(crate) fn uses_swarm_rows(self) -> bool {
+        self == Self::SoftStep
+    }
+
+    /// True if impulses are shared by mass, and marbles of infinite mass stay on their way.
+    pub(crate) fn knows_masses(self) -> bool {
+        self != Self::Displacement
+    }
+
+    /// True if the solver reads the column of inverse masses.
+    pub(crate) fn reads_inverse_masses(self) -> bool {
+        matches!(self, Self::Impulse | Self::Penalty(_))
+    }
+
+    /// True if pairs are listed that met within the substep and are apart at its end.
+    pub(crate) fn lists_grazes(self) -> bool {
+        matches!(self, Self::Displacement | Self::Impulse)
+    }
+
+    /// True if nothing passes through a wall, whatever the world's detection.
+    pub(crate) fn never_passes_walls(self) -> bool {
+        matches!(self, Self::EventDriven | Self::Displacement)
+    }
 }

@@ -4,11 +4,9 @@ use super::batches::Batch;
 use super::bit_set::BitSet;
 use crate::broad::{CollisionFilter, CollisionLayers, IgnoredPairs};
 use crate::math::{LANES, Scalar};
+use crate::motion::BALL_INVERSE_INERTIA;
 use crate::response::Material;
 use crate::uncompared::Uncompared;
-
-/// Mass times radius squared over the moment of inertia of a solid ball.
-pub(super) const SOLID_BALL: f64 = 2.5;
 
 /// Surface of a ball: its material, and whether contacts can set it spinning.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +18,7 @@ pub(crate) struct BallSurface<S> {
 impl<S: Scalar> BallSurface<S> {
     /// Mass times radius squared over the moment of inertia; zero where the rotation is locked.
     fn inertia_factor(self) -> S {
-        if self.rotation_locked { S::zero() } else { S::from_f64(SOLID_BALL) }
+        if self.rotation_locked { S::zero() } else { S::from_f64(BALL_INVERSE_INERTIA) }
     }
 }
 

@@ -4,13 +4,12 @@ use super::World;
 use crate::Error;
 use crate::broad::{CrowdBall, pairs_among};
 use crate::math::Scalar;
-use crate::response::Response;
 
 impl<S: Scalar> World<S> {
     /// Largest number of pairs of overlapping marbles, and balls of the [swarm](Self::swarm), that a
     /// step takes.
     ///
-    /// As candidates of contacts they fill a gigabyte. [`SoftStep`](Response::SoftStep) and swarms
+    /// As candidates of contacts they fill a gigabyte. [`SoftStep`](crate::response::Response::SoftStep) and swarms
     /// list at most 64 pairs for each ball, which takes less than half of that, and look at all in
     /// each search, which takes about a second.
     pub const MAX_PAIRS: u64 = 1 << 27;
@@ -42,14 +41,14 @@ impl<S: Scalar> World<S> {
     }
 
     /// Returns false if the last step took what overlaps now. Solved contacts part marbles, so by
-    /// [`SoftStep`](Response::SoftStep) and in swarms, which take millions, they are counted only where
+    /// [`SoftStep`](crate::response::Response::SoftStep) and in swarms, which take millions, they are counted only where
     /// somebody else moved them, or where not all pairs were listed.
     fn may_be_crowded(&self) -> bool {
         if self.swarm.may_be_crowded() {
             return true;
         }
         let count = self.marbles.len();
-        if self.settings.model.response == Response::SoftStep {
+        if self.settings.model.response.uses_swarm_rows() {
             // Each marble that was set overlaps at most all others.
             self.changed_marbles().is_none_or(|changed| {
                 (changed as u64).saturating_mul(count as u64) > Self::MAX_PAIRS

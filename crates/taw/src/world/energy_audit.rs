@@ -158,7 +158,7 @@ impl<S: Scalar> World<S> {
     /// Adds up what walls and forces did to balls of the swarm and, if they are rows of it, to marbles.
     pub(super) fn audit_rows_after(&mut self) {
         let Some(audit_state) = &mut self.scratch.audit_state else { return };
-        let soft = self.settings.model.response == Response::SoftStep;
+        let soft = self.settings.model.response.uses_swarm_rows();
         let rows = if soft { &self.scratch.soft_step.marble_of_slot[..] } else { &[] };
         audit_state.work.collisions += if soft { self.impacts.len() as u32 } else { 0 };
         for (slot, work) in self.swarm.take_outside_work().into_iter().enumerate() {

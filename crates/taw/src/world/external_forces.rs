@@ -8,6 +8,7 @@ use crate::Error;
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Bivector;
 use crate::math::{Point3, Scalar, Vec3, cast_vector};
+use crate::motion::BALL_INERTIA;
 use crate::response::CapsuleInertia;
 
 const ACCELERATION: [&str; 3] = ["acceleration.x", "acceleration.y", "acceleration.z"];
@@ -201,7 +202,7 @@ impl<S: Scalar> Marbles<S> {
             (self.angular_velocity_f64(row), self.radius[row].as_f64());
         let half = self.half_length(row).as_f64();
         if half == 0.0 {
-            return 0.4 * (angular_velocity * radius).magnitude2();
+            return BALL_INERTIA * (angular_velocity * radius).magnitude2();
         }
         let [along, across] = CapsuleInertia::unit_inertia(radius, half);
         let axis = cast_vector::<S, f64>(self.axis(row)).normalize();
@@ -221,7 +222,7 @@ impl<S: Scalar> Marbles<S> {
     pub(super) fn scale_by_moments(&self, row: usize, v: Vec3<S>, of: impl Fn(S) -> S) -> Vec3<S> {
         let (radius, half) = (self.radius[row], self.half_length(row));
         if half == S::zero() {
-            return v * of(S::from_f64(0.4) * radius * radius);
+            return v * of(S::from_f64(BALL_INERTIA) * radius * radius);
         }
         let [along, across] = CapsuleInertia::unit_inertia(radius, half).map(of);
         let axis = self.axis(row);

@@ -70,7 +70,7 @@ use crate::contact::Contacts;
 use crate::error::{finite, finite_vector, positive};
 use crate::math::{Point3, Scalar, Vec3, length};
 use crate::motion::{ForceField, Rotation};
-use crate::response::{Impact, Response};
+use crate::response::Impact;
 use crate::swarm::Swarm;
 use contact_memory::ContactMemory;
 use scratch::WorldScratch;
@@ -98,7 +98,7 @@ pub struct World<S: Scalar> {
     /// be edited: a removed contact is not solved, a changed normal, separation or
     /// [material](crate::contact::Contact::material) is the one that is solved, and a contact of a row that
     /// does not exist is ignored.
-    /// ([`Response::EventDriven`] and [`Response::SoftStep`] detect collisions themselves, whatever
+    /// ([`Response::EventDriven`](crate::response::Response::EventDriven) and [`Response::SoftStep`](crate::response::Response::SoftStep) detect collisions themselves, whatever
     /// is edited.)
     ///
     /// Of each marble, the contacts with at most 32 marbles of its size or larger are listed, the
@@ -125,8 +125,8 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for the substeps or the iterations; [`Error::UnsupportedShape`] for
-    /// [`Response::EventDriven`] and [`Response::SoftStep`] if a marble is a capsule;
-    /// [`Error::Unsupported`] for [`Response::SoftStep`] in a periodic world.
+    /// [`Response::EventDriven`](crate::response::Response::EventDriven) and [`Response::SoftStep`](crate::response::Response::SoftStep) if a marble is a capsule;
+    /// [`Error::Unsupported`] for [`Response::SoftStep`](crate::response::Response::SoftStep) in a periodic world.
     pub fn set_model(&mut self, model: Model) -> Result<(), Error> {
         let model = model.validated()?;
         if !model.response.knows_capsules()
@@ -137,7 +137,7 @@ impl<S: Scalar> World<S> {
         if model == self.settings.model {
             return Ok(());
         }
-        if model.response == Response::SoftStep && !self.marbles.period.is_open() {
+        if model.response.uses_swarm_rows() && !self.marbles.period.is_open() {
             return Err(Error::Unsupported { response: "SoftStep", feature: "a period" });
         }
         self.settings.model = model;
@@ -183,13 +183,13 @@ impl<S: Scalar> World<S> {
     /// Walls are not repeated: one that crosses a side has to be a half-space along it. Balls of
     /// [`World::swarm`], queries and attraction are not periodic. [`World::energy`] and the energy
     /// audit use positions as they are: a marble that crosses a side along gravity changes them.
-    /// Except by [`Response::EventDriven`], a marble that moves by more than a quarter of a length in
+    /// Except by [`Response::EventDriven`](crate::response::Response::EventDriven), a marble that moves by more than a quarter of a length in
     /// a substep may pass through others.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a length of less than 8.02 radii of the largest marble;
     /// [`Error::NotPositive`] for one that is no length; [`Error::UnsupportedShape`] if a marble is
-    /// a capsule; [`Error::Unsupported`] for [`Response::SoftStep`]. Steps refuse marbles that were
+    /// a capsule; [`Error::Unsupported`] for [`Response::SoftStep`](crate::response::Response::SoftStep). Steps refuse marbles that were
     /// added later in the same way.
     pub fn set_period(&mut self, lengths: [Option<S>; 3]) -> Result<(), Error> {
         for (length, field) in lengths.iter().zip(["period.x", "period.y", "period.z"]) {
@@ -252,8 +252,8 @@ impl<S: Scalar> World<S> {
     }
 
     /// Impacts of the last step that are in no list of contacts: those of
-    /// [`Response::EventDriven`], in the order of time within each substep, and of
-    /// [`Response::SoftStep`] those of marbles: bounces in the order in which they were solved, each with
+    /// [`Response::EventDriven`](crate::response::Response::EventDriven), in the order of time within each substep, and of
+    /// [`Response::SoftStep`](crate::response::Response::SoftStep) those of marbles: bounces in the order in which they were solved, each with
     /// the speed and the normal of its impulse, and then the impacts of what does not bounce, at most one
     /// for each contact, in the order of [`World::contacts`]. (Without restitution an impact may take two
     /// steps, and is told in both, with the speed that is left.) Other responses list contacts where
@@ -263,7 +263,7 @@ impl<S: Scalar> World<S> {
         &self.impacts
     }
 
-    /// Residual of [`Response::Impulse`] in the last substep: maximum change of a velocity in the
+    /// Residual of [`Response::Impulse`](crate::response::Response::Impulse) in the last substep: maximum change of a velocity in the
     /// last iteration, in m/s. Iterations end at [`Model::iterations`], or when the residual is
     /// below the rounding error of the speed that gravity adds in two substeps.
     #[must_use]

@@ -112,7 +112,7 @@ impl Model {
     /// the [response](Self::response) cuts its verb into substeps by itself.
     #[must_use]
     pub fn passes(&self) -> u32 {
-        if self.response == Response::SoftStep { 1 } else { self.substeps }
+        if self.response.uses_swarm_rows() { 1 } else { self.substeps }
     }
 
     /// Validates the model.

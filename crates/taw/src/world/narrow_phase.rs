@@ -12,7 +12,6 @@ use super::{WallShape, World};
 use crate::broad::CollisionFilter;
 use crate::contact::{Contact, ContactMaterial};
 use crate::math::{Scalar, Vec3, normal_and_distance};
-use crate::response::Response;
 use crate::shape::{Aabb, Aabb3, BoundedShape, PointProjection, Shape, Sphere};
 
 /// Tolerance of internal edges, as a fraction of the radius: a point this far outside of another
@@ -216,8 +215,7 @@ impl<S: Scalar> World<S> {
 impl<S: Scalar> World<S> {
     /// Adds pairs that met within the substep, though they are apart at its end.
     pub(super) fn add_grazing_contacts(&mut self) {
-        let looks =
-            matches!(self.settings.model.response, Response::Displacement | Response::Impulse);
+        let looks = self.settings.model.response.lists_grazes();
         if self.scratch.continuous.grazes.is_empty() || !looks {
             return;
         }

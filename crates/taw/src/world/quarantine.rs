@@ -9,7 +9,7 @@ use crate::Error;
 use crate::broad::Period;
 use crate::error::{positive, within};
 use crate::math::{Point3, Quat, Scalar, is_finite, is_finite_point};
-use crate::response::{Response, rename_rows};
+use crate::response::rename_rows;
 
 /// Poses at the start of the substep.
 #[derive(Clone, Debug, Default)]
@@ -88,7 +88,7 @@ impl<S: Scalar> World<S> {
         if period.is_open() {
             return Ok(());
         }
-        if self.settings.model.response == Response::SoftStep {
+        if self.settings.model.response.uses_swarm_rows() {
             return Err(Error::Unsupported { response: "SoftStep", feature: "a period" });
         }
         if let Some(id) = self.marbles.first_capsule() {

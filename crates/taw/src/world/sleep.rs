@@ -11,7 +11,7 @@ use crate::handle::MarbleId;
 use crate::math::{Point3, Scalar, UnionFind, Vec3, length};
 use crate::motion::Mass;
 use crate::motion::rest::{self, is_slow};
-use crate::response::{KeyedByContact, Response};
+use crate::response::KeyedByContact;
 use crate::shape::Aabb3;
 
 /// Substeps after which islands are searched, if anybody has rested for long enough.
@@ -63,7 +63,7 @@ impl<S: Scalar> World<S> {
     /// [`Error::NoSuchMarble`].
     pub fn is_asleep(&self, id: MarbleId) -> Result<bool, Error> {
         let row = self.marbles.row(id)?;
-        Ok(if self.settings.model.response == Response::SoftStep {
+        Ok(if self.settings.model.response.uses_swarm_rows() {
             self.is_soft_asleep(id, row)
         } else {
             self.marbles.sleep.is_asleep(row)

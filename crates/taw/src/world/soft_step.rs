@@ -17,7 +17,7 @@ use crate::error::within;
 use crate::handle::NO_ROW;
 use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::Rotation;
-use crate::response::{Material, Response};
+use crate::response::Material;
 use crate::swarm::{
     BallSurface, Body, INFINITE_MASS, LEAST_RADIUS, MAX_COORDINATE, MarbleRow, NearLimits,
     SyncToken, VelocityChange,
@@ -244,7 +244,7 @@ impl<S: Scalar> World<S> {
 
     /// Checks that the numbers of all marbles that were set fit into rows.
     pub(super) fn check_rows(&self) -> Result<(), Error> {
-        if self.settings.model.response != Response::SoftStep {
+        if !self.settings.model.response.uses_swarm_rows() {
             return Ok(());
         }
         if self.changes_are_listed() {
@@ -255,9 +255,9 @@ impl<S: Scalar> World<S> {
     }
 
     /// Marbles by which the next [step](Self::step) would be refused, each with the reason: of
-    /// [`Response::SoftStep`], those that were set to numbers that do not fit into its rows.
+    /// [`Response::SoftStep`](crate::response::Response::SoftStep), those that were set to numbers that do not fit into its rows.
     pub fn unsupported_marbles(&self) -> Vec<(MarbleId, Error)> {
-        if self.settings.model.response != Response::SoftStep {
+        if !self.settings.model.response.uses_swarm_rows() {
             return Vec::new();
         }
         let find = |row: usize| Some((self.marbles.id(row)?, self.check_row(row).err()?));

@@ -8,7 +8,7 @@ use super::walls::Walls;
 use crate::math::{Scalar, Vec3, length};
 use crate::motion::Rotation;
 use crate::response::impulse::{Context, SolverSettings, SubstepStart};
-use crate::response::{CapsuleInertia, Response, SolverBodies};
+use crate::response::{CapsuleInertia, SolverBodies};
 
 /// Columns that a solver reads besides those of the marbles.
 #[derive(Clone, Debug, Default)]
@@ -28,7 +28,7 @@ impl<S: Scalar> MarbleColumns<S> {
     /// Brings masses, locks and capsules up to date with the marbles.
     pub fn read(&mut self, marbles: &mut Marbles<S>, model: Model) {
         self.inverse_mass.clear();
-        if matches!(model.response, Response::Impulse | Response::Penalty(_)) {
+        if model.response.reads_inverse_masses() {
             let masses = (0..marbles.len()).map(|row| marbles.mass(row));
             self.inverse_mass.extend(masses.map(|mass| S::one() / mass));
         }

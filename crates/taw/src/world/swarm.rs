@@ -9,7 +9,6 @@ use super::swept_walls::SweptWalls;
 use crate::Error;
 use crate::math::{Scalar, Vec3, cast_vector};
 use crate::motion::{Mass, Motion, acceleration_in_step};
-use crate::response::Response;
 use crate::swarm::{BallId, MAX_COORDINATE, Proxy, Stage, VelocityChange};
 
 impl<S: Scalar> World<S> {
@@ -24,7 +23,7 @@ impl<S: Scalar> World<S> {
     /// [`Error::TooManyPairs`] if more than [`World::MAX_PAIRS`] overlap, [`Error::Full`] at 2³² − 1
     /// balls.
     pub fn step_swarm(&mut self, dt: S, observe: &mut dyn FnMut(Stage)) -> Result<(), Error> {
-        if self.settings.model.response != Response::SoftStep {
+        if !self.settings.model.response.uses_swarm_rows() {
             self.check_crowding()?;
         }
         self.move_swarm(dt, observe)
@@ -37,7 +36,7 @@ impl<S: Scalar> World<S> {
         observe: &mut dyn FnMut(Stage),
     ) -> Result<(), Error> {
         let dt = Self::validated_dt(dt)?;
-        if self.settings.model.response == Response::SoftStep {
+        if self.settings.model.response.uses_swarm_rows() {
             return Ok(()); // it moved with the marbles
         }
         self.swarm.set_bodies_are_rows(false);

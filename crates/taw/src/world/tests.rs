@@ -2,7 +2,7 @@ use super::*;
 use crate::contact::Contact;
 use crate::math::{Point3, Quat};
 use crate::motion::Integrator;
-use crate::response::Material;
+use crate::response::{Material, Response};
 use crate::shape::Plane;
 use cgmath::InnerSpace;
 

@@ -1,4 +1,5 @@
-//! taw's entities in a Bevy app without a window: a whole frame with one `FixedUpdate`.
+//! taw's entities in a Bevy app without a window: a whole frame with one `FixedUpdate`; and the part of it
+//! that Bevy takes when a system writes the transforms and there is no physics.
 
 use std::time::Duration;
 
@@ -11,6 +12,55 @@ use crate::scene::Scene;
 use crate::taw::{model, swarm_model};
 use crate::{AUTOMATIC, DT, Engine, FRICTION, RESTITUTION, THREADS};
 
+/// App whose frames are as long as a step.
+fn empty() -> App {
+    let mut app = App::new();
+    app.add_plugins((
+        MinimalPlugins
+            .set(TaskPoolPlugin { task_pool_options: TaskPoolOptions::with_num_threads(THREADS) }),
+        TransformPlugin,
+    ));
+    let step = Duration::from_secs_f32(DT);
+    app.insert_resource(Time::<Fixed>::from_duration(step));
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
+    app
+}
+
+/// Bevy without physics: the transforms of awake balls are written in each step.
+pub struct Bevy {
+    app: App,
+    balls: Vec<Entity>,
+}
+
+impl Bevy {
+    pub fn new(scene: &Scene) -> Self {
+        let mut app = empty();
+        if !scene.sleeps {
+            app.add_systems(FixedUpdate, |mut places: Query<&mut Transform>| {
+                places.iter_mut().for_each(|mut place| place.set_changed());
+            });
+        }
+        app.finish();
+        app.update();
+        let place = |(at, _): &(Vec3, f32)| Transform::from_translation(*at);
+        let balls = scene.balls.iter().map(|ball| app.world_mut().spawn(place(ball)).id());
+        let balls = balls.collect();
+        Self { app, balls }
+    }
+}
+
+impl Engine for Bevy {
+    fn step(&mut self, _: Quat, _: Quat) {
+        self.app.update();
+    }
+
+    fn state(&self) -> Vec<[Vec3; 2]> {
+        let place = |ball: &Entity| self.app.world().entity(*ball).get::<Transform>();
+        let of = |ball| [place(ball).map_or(Vec3::NAN, |at| at.translation), Vec3::ZERO];
+        self.balls.iter().map(of).collect()
+    }
+}
+
 pub struct Entities {
     app: App,
     /// Walls, and where they are while nothing has turned.
@@ -20,17 +70,8 @@ pub struct Entities {
 
 impl Entities {
     pub fn new(scene: &Scene) -> Self {
-        let mut app = App::new();
-        app.add_plugins((
-            MinimalPlugins.set(TaskPoolPlugin {
-                task_pool_options: TaskPoolOptions::with_num_threads(THREADS),
-            }),
-            TransformPlugin,
-            TawPlugin,
-        ));
-        let step = Duration::from_secs_f32(DT);
-        app.insert_resource(Time::<Fixed>::from_duration(step));
-        app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
+        let mut app = empty();
+        app.add_plugins(TawPlugin);
         app.insert_resource(TawModel(model(Response::SoftStep)));
         app.insert_resource(TawSwarmModel(swarm_model(Tier::Full, 2, AUTOMATIC, scene.sleeps)));
         app.finish();

@@ -2,7 +2,8 @@
 //!
 //! `cargo run --release --bin race` in this folder. Arguments: beginnings of the names of scenes and
 //! of engines (`pour`, `taw`); `--million` adds a million balls in taw; `--csv FILE` also writes the
-//! table there. Two threads, f32, 60 Hz, nothing sleeps except in the scene of that name; means of
+//! table there. "Bevy alone" is an app in which a system marks the transforms of awake balls as changed: what it
+//! takes is no part of the physics. Two threads, f32, 60 Hz, nothing sleeps except in the scene of that name; means of
 //! the last 60 of 240 steps, and of steps 61 to 120, in which most still moves.
 
 mod avian;
@@ -91,10 +92,11 @@ fn run(scene: &Scene, mut engine: Box<dyn Engine>) -> Outcome {
 type Entry = (&'static str, usize, fn(&Scene) -> Box<dyn Engine>);
 
 /// Rapier first: the others are compared with it.
-const ENGINES: [Entry; 12] = [
+const ENGINES: [Entry; 13] = [
     ("Rapier 0.36.1", 100_000, |scene| Box::new(rapier::Rapier::new(scene))),
     ("Box3D (boxddd 0.4.0)", 100_000, |scene| Box::new(box3d::Box3d::new(scene).expect("a world"))),
     ("Avian 0.7.0", 10_000, |scene| Box::new(avian::Avian::new(scene))),
+    ("Bevy alone", 100_000, |scene| Box::new(entities::Bevy::new(scene))),
     ("taw entities in Bevy, SoftStep", 100_000, |scene| Box::new(entities::Entities::new(scene))),
     ("taw marbles, SoftStep", 100_000, |scene| marbles(scene, Response::SoftStep, AUTOMATIC)),
     ("taw marbles, SoftStep, one thread", 100_000, |scene| marbles(scene, Response::SoftStep, 1)),
@@ -165,7 +167,7 @@ fn main() -> std::io::Result<()> {
     for scene in scenes.iter().filter(|scene| among(scene_names.clone(), scene.name)) {
         let mut rapier = None;
         for (name, most, new) in ENGINES {
-            let runs = !scene.sleeps || name.starts_with("taw");
+            let runs = !scene.sleeps || ["taw", "Bevy"].iter().any(|taw| name.starts_with(taw));
             if scene.balls.len() > most || !runs || !among(engine_names.clone(), name) {
                 continue;
             }

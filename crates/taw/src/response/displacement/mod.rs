@@ -8,7 +8,7 @@ mod tests;
 
 use cgmath::{InnerSpace, Zero};
 
-use super::impulse::{BodyA, CachedImpulse, Context};
+use super::impulse::{BodyA, CachedImpulse, Context, SolverSettings};
 use super::{Colliders, ContactKey, KeyedByContact, SolverBodies};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Scalar, UnionFind, Vec3, is_finite, is_finite_point};
@@ -86,6 +86,25 @@ pub(crate) fn solve_displacement<S: Scalar>(
     let DisplacementScratch { constraints, initial_velocity, islands, warm_starts } = scratch;
     initial_velocity.clear();
     initial_velocity.extend_from_slice(marbles.velocity);
+    prepare(marbles, contacts, context, constraints, islands);
+    warm_start(marbles, constraints, cache, warm_starts);
+    iterate(marbles, constraints, context.settings);
+    for c in constraints.iter().filter(|c| c.a.marble().is_none()) {
+        on_wall_impulse(c.b as u32, c.normal, [c.velocity_change, c.surface_speed]);
+    }
+    marbles.follow_velocity_changes(initial_velocity, context, quarantined);
+    solve_positions(marbles, constraints, context);
+    store_changes(constraints, cache);
+}
+
+/// Prepares a constraint per contact, walls first, and assigns islands.
+fn prepare<S: Scalar>(
+    marbles: &SolverBodies<S>,
+    contacts: &Contacts<S>,
+    context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
+    constraints: &mut Vec<ApproachConstraint<S>>,
+    islands: &mut UnionFind,
+) {
     constraints.clear();
     constraints.extend(
         BodyA::of_each(contacts)
@@ -95,18 +114,65 @@ pub(crate) fn solve_displacement<S: Scalar>(
     for c in constraints.iter_mut() {
         c.island = islands.set_of(c.b);
     }
-    marbles.warm_start_scaled(constraints, cache, warm_starts);
-    let rounding = context.settings.restitution_threshold * S::epsilon();
-    for _ in 0..context.settings.iterations {
+}
+
+/// Warm start: applies the changes of the last substep, scaled per island to the fraction that
+/// comes closest to the requested changes, so that they give no energy. The iterations only
+/// take energy, as each lowers `½ f·A f − f·w`, with `f` the changes, `A f` their effect on the
+/// separation speeds, and `w` the requested one.
+fn warm_start<S: Scalar>(
+    marbles: &mut SolverBodies<S>,
+    constraints: &mut [ApproachConstraint<S>],
+    cache: &[CachedImpulse<S>],
+    warm_starts: &mut Vec<WarmStartSums<S>>,
+) {
+    warm_starts.clear();
+    warm_starts
+        .resize(constraints.len(), WarmStartSums { requested: S::zero(), achieved: S::zero() });
+    for c in constraints.iter_mut() {
+        let Ok(at) = cache.binary_search_by_key(&c.key, CachedImpulse::key) else { continue };
+        c.velocity_change = cache[at].normal_impulse();
+        let (weighted_change, separation_speed) =
+            (c.velocity_change * c.fraction_b(), marbles.separation_speed(c));
+        let warm_start = &mut warm_starts[c.island as usize];
+        warm_start.requested += weighted_change * (c.min_separation_speed - separation_speed);
+        warm_start.achieved -= weighted_change * separation_speed;
+    }
+    for c in constraints.iter() {
+        marbles.apply_velocity_change(c, c.velocity_change);
+    }
+    for c in constraints.iter() {
+        warm_starts[c.island as usize].achieved +=
+            c.velocity_change * c.fraction_b() * marbles.separation_speed(c);
+    }
+    for c in constraints.iter_mut() {
+        let fraction = warm_starts[c.island as usize].fraction();
+        marbles.apply_velocity_change(c, c.velocity_change * (fraction - S::one()));
+        c.velocity_change *= fraction;
+    }
+}
+
+/// Solves the constraints one after the other, until none changes or the iterations are used up.
+fn iterate<S: Scalar>(
+    marbles: &mut SolverBodies<S>,
+    constraints: &mut [ApproachConstraint<S>],
+    settings: &SolverSettings<S>,
+) {
+    let rounding = settings.restitution_threshold * S::epsilon();
+    for _ in 0..settings.iterations {
         let solve = |any_changed: bool, c| marbles.solve_approach(c, rounding) || any_changed;
         if !constraints.iter_mut().fold(false, solve) {
             break;
         }
     }
-    for c in constraints.iter().filter(|c| c.a.marble().is_none()) {
-        on_wall_impulse(c.b as u32, c.normal, [c.velocity_change, c.surface_speed]);
-    }
-    marbles.follow_velocity_changes(initial_velocity, context, quarantined);
+}
+
+/// Resolves the penetration that is left, without a change of velocity.
+fn solve_positions<S: Scalar>(
+    marbles: &mut SolverBodies<S>,
+    constraints: &[ApproachConstraint<S>],
+    context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
+) {
     for _ in 0..context.settings.iterations {
         let separate = |any_moved: bool, c| marbles.separate(c, context) || any_moved;
         if !constraints.iter().fold(false, separate) {
@@ -117,8 +183,14 @@ pub(crate) fn solve_displacement<S: Scalar>(
     for c in constraints.iter().filter(|c| c.a.marble().is_none()) {
         marbles.separate(c, context);
     }
+}
+
+/// Stores the changes of speed for the next substep's warm start. A contact that bears nothing has no entry.
+fn store_changes<S: Scalar>(
+    constraints: &[ApproachConstraint<S>],
+    cache: &mut Vec<CachedImpulse<S>>,
+) {
     cache.clear();
-    // What bears nothing begins from nothing.
     let bearing = constraints.iter().filter(|c| c.velocity_change > S::zero());
     cache.extend(bearing.map(|c| CachedImpulse::of_normal_impulse(c.key, c.velocity_change)));
     cache.sort_unstable_by_key(CachedImpulse::key);
@@ -196,42 +268,6 @@ impl<S: Scalar> SolverBodies<'_, S> {
                 self.velocity[a as usize] -= half;
                 self.velocity[c.b] += half;
             }
-        }
-    }
-
-    /// Warm start: applies the changes of the last substep, scaled per island to the fraction that
-    /// comes closest to the requested changes, so that they give no energy. The iterations only
-    /// take energy, as each lowers `½ f·A f − f·w`, with `f` the changes, `A f` their effect on the
-    /// separation speeds, and `w` the requested one.
-    fn warm_start_scaled(
-        &mut self,
-        constraints: &mut [ApproachConstraint<S>],
-        cache: &[CachedImpulse<S>],
-        warm_starts: &mut Vec<WarmStartSums<S>>,
-    ) {
-        warm_starts.clear();
-        warm_starts
-            .resize(constraints.len(), WarmStartSums { requested: S::zero(), achieved: S::zero() });
-        for c in constraints.iter_mut() {
-            let Ok(at) = cache.binary_search_by_key(&c.key, CachedImpulse::key) else { continue };
-            c.velocity_change = cache[at].normal_impulse();
-            let (weighted_change, separation_speed) =
-                (c.velocity_change * c.fraction_b(), self.separation_speed(c));
-            let warm_start = &mut warm_starts[c.island as usize];
-            warm_start.requested += weighted_change * (c.min_separation_speed - separation_speed);
-            warm_start.achieved -= weighted_change * separation_speed;
-        }
-        for c in constraints.iter() {
-            self.apply_velocity_change(c, c.velocity_change);
-        }
-        for c in constraints.iter() {
-            warm_starts[c.island as usize].achieved +=
-                c.velocity_change * c.fraction_b() * self.separation_speed(c);
-        }
-        for c in constraints.iter_mut() {
-            let fraction = warm_starts[c.island as usize].fraction();
-            self.apply_velocity_change(c, c.velocity_change * (fraction - S::one()));
-            c.velocity_change *= fraction;
         }
     }
 

@@ -7,6 +7,7 @@ use super::{EventBall, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
 use crate::broad::Period;
 use crate::contact::Contacts;
 use crate::math::{Point3, UnionFind, Vec3};
+use crate::motion::BALL_INERTIA;
 use crate::response::impulse::{self, CachedImpulse, Context, SubstepStart, solve_contacts};
 use crate::response::{BallRotation, EnergyLedger, SolverBodies};
 
@@ -190,7 +191,7 @@ impl Cluster {
             &self.bodies;
         let of_ball = |at: usize| {
             let arm = if rotation_locked[at] { 0.0 } else { radius[at] };
-            let turning = 0.4 * arm * arm * spin[at].magnitude2();
+            let turning = BALL_INERTIA * arm * arm * spin[at].magnitude2();
             (velocity[at].magnitude2() + turning) / inverse_mass[at]
         };
         (0..self.rows.len()).filter(|at| inverse_mass[*at] > 0.0).map(of_ball).sum()

@@ -16,6 +16,7 @@ use super::support_candidates::SupportCandidates;
 use super::{EventBall, Wall};
 use crate::contact::ContactMaterial;
 use crate::math::{Point3, Vec3, normalize_and_length};
+use crate::motion::BALL_INVERSE_INERTIA;
 use crate::response::{BallRotation, Material};
 use crate::shape::PointProjection;
 
@@ -235,7 +236,9 @@ impl CurvedSupport<'_> {
             })
             .map_or_else(Vec3::zero, |(direction, _)| {
                 direction
-                    * (-2.5 * contact.material.rolling_resistance * contact.normal_acceleration)
+                    * (-BALL_INVERSE_INERTIA
+                        * contact.material.rolling_resistance
+                        * contact.normal_acceleration)
             })
     }
 
@@ -295,13 +298,16 @@ impl CurvedSupport<'_> {
         };
         let mut spin = Vec3::zero();
         if self.rotation == BallRotation::Free && regime != Regime::Resting {
-            let spin_rate = friction * 2.5 + self.rolling_resistance(&contact, state.spin);
+            let spin_rate =
+                friction * BALL_INVERSE_INERTIA + self.rolling_resistance(&contact, state.spin);
             spin = spin_rate.cross(normal) / self.radius;
             let torsional_spin = state.spin.dot(normal);
             let torsional_rate =
                 contact.material.spinning_resistance * contact.normal_acceleration.max(0.0);
             if torsional_rate > 0.0 && torsional_spin != 0.0 {
-                spin -= normal * (2.5 * torsional_rate / self.radius * torsional_spin.signum());
+                spin -= normal
+                    * (BALL_INVERSE_INERTIA * torsional_rate / self.radius
+                        * torsional_spin.signum());
             }
         }
         let acceleration =
@@ -320,7 +326,8 @@ impl CurvedSupport<'_> {
             let correction = contact.slip / self.tangent_inverse_mass();
             state.velocity -= correction;
             if self.rotation == BallRotation::Free {
-                state.spin -= correction.cross(contact.normal) * (2.5 / self.radius);
+                state.spin -=
+                    correction.cross(contact.normal) * (BALL_INVERSE_INERTIA / self.radius);
             }
         }
         Some(state)

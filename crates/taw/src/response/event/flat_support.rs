@@ -10,6 +10,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::TIME_RESOLUTION;
 use crate::math::{Vec3, normalize_and_length};
+use crate::motion::BALL_INVERSE_INERTIA;
 
 /// Largest rotation of the surface in one step, in radians.
 const MAX_TURN: f64 = 4e-3;
@@ -87,11 +88,13 @@ impl FlatSupport {
         if slip.magnitude() <= 1e-6 * slip_rate * dt {
             now.v -= slip / self.tangent_inverse_mass();
             if self.rotates {
-                now.p -= slip * (2.5 / self.tangent_inverse_mass());
+                now.p -= slip * (BALL_INVERSE_INERTIA / self.tangent_inverse_mass());
             }
             slip = Vec3::zero();
         }
-        if now.p.magnitude() <= 2.5e-6 * self.rolling_resistance * self.normal_acceleration * dt {
+        if now.p.magnitude()
+            <= 1e-6 * BALL_INVERSE_INERTIA * self.rolling_resistance * self.normal_acceleration * dt
+        {
             now.p = Vec3::zero();
         }
         let regime = self.regime(now, slip);
@@ -109,7 +112,8 @@ impl FlatSupport {
             spin_acceleration = rate.p.cross(n) / self.radius;
             let torsional_spin = spin.dot(n);
             let torsional_rate =
-                2.5 * self.spinning_resistance * self.normal_acceleration / self.radius;
+                BALL_INVERSE_INERTIA * self.spinning_resistance * self.normal_acceleration
+                    / self.radius;
             if torsional_rate > 0.0 && torsional_spin.abs() > torsional_rate * dt * 1e-12 {
                 spin_acceleration -= n * (torsional_rate * torsional_spin.signum());
                 duration = duration.min(torsional_spin.abs() / torsional_rate);
@@ -172,7 +176,7 @@ impl FlatSupport {
         let direction = normalize_and_length(at.p)
             .or_else(|| normalize_and_length(self.surface_rate(at) - self.tangential_acceleration))
             .map_or_else(Vec3::zero, |(direction, _)| direction);
-        direction * (-2.5 * self.rolling_resistance * self.normal_acceleration)
+        direction * (-BALL_INVERSE_INERTIA * self.rolling_resistance * self.normal_acceleration)
     }
 
     /// Friction per mass that keeps the contact point at rest while the ball rolls.
@@ -199,7 +203,7 @@ impl FlatSupport {
             }
         };
         let p = if self.rotates {
-            friction * 2.5 + self.rolling_resistance_rate(at)
+            friction * BALL_INVERSE_INERTIA + self.rolling_resistance_rate(at)
         } else {
             Vec3::zero()
         };

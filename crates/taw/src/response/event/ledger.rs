@@ -4,6 +4,7 @@ use cgmath::InnerSpace;
 
 use super::{EventBall, EventSolver, Wall};
 use crate::math::Vec3;
+use crate::motion::BALL_INERTIA;
 use crate::response::{BallRotation, EnergyLedger};
 
 impl EventSolver {
@@ -53,7 +54,7 @@ impl EventSolver {
         let surface = (surface + later_surface) * 0.5;
         let friction = -0.5 * constraint_impulse.dot(slip + later_slip);
         let inertia = match ball.rotation {
-            BallRotation::Free => 0.4 * mass * ball.radius * ball.radius,
+            BallRotation::Free => BALL_INERTIA * mass * ball.radius * ball.radius,
             BallRotation::Locked => 0.0,
         };
         let rotation = later.rotation_increment - ball.rotation_increment;

@@ -7,6 +7,7 @@ use super::collide::Collision;
 use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::contact::ContactMaterial;
 use crate::math::Vec3;
+use crate::motion::BALL_INERTIA;
 use crate::response::BallRotation;
 
 /// Maximum number of iterations.
@@ -112,7 +113,7 @@ impl EventSolver {
         let of_ball = |(row, (a, b)): (&usize, (&VelocityAndSpin, &VelocityAndSpin))| {
             let ball = &self.balls[*row];
             let inertia = match ball.rotation {
-                BallRotation::Free => 0.4 * ball.radius * ball.radius,
+                BallRotation::Free => BALL_INERTIA * ball.radius * ball.radius,
                 BallRotation::Locked => 0.0,
             };
             let product = a[0].dot(b[0]) + inertia * a[1].dot(b[1]);

@@ -6,7 +6,7 @@ use super::contact::PenaltyContact;
 use super::law::Springs;
 use super::mass_split::{damped_fraction, undamped_fraction};
 use super::{PenaltySettings, SpringHistory};
-use crate::constraint::solve_rolling;
+use crate::constraint::{ContactImpulse, FrictionCone, solve_rolling};
 use crate::math::{RealVector, Scalar, Vec3, cast_vector, is_finite};
 use crate::response::{Colliders, EnergyLedger, SolverBodies};
 
@@ -162,7 +162,8 @@ impl<S: Scalar> ContactForce<S> {
         [self.spring_impulse, self.normal_impulse] =
             self.normal_impulses(self.springs.elastic_force, separation_speed, dt);
         let tangent_velocity = relative_velocity - normal * separation_speed;
-        let limit = material.friction * self.normal_impulse;
+        let cone = FrictionCone::new(material.friction);
+        let limit = cone.max_friction(self.normal_impulse);
         // The tangential displacement rotates with the contact plane.
         let previous = self.history.tangent_displacement;
         let mut tangent_displacement = previous - normal * previous.dot(normal);
@@ -184,7 +185,8 @@ impl<S: Scalar> ContactForce<S> {
         let dashpot = damped / self.contact.inverse_effective_mass().tangent;
         let spring_and_dashpot =
             tangent_displacement * impulse_per_displacement + tangent_velocity * dashpot;
-        let tangent_impulse = (-spring_and_dashpot).clamp_length(limit);
+        let wanted = ContactImpulse { normal: self.normal_impulse, tangent: -spring_and_dashpot };
+        let tangent_impulse = cone.clamp(wanted).tangent;
         self.history.tangent_displacement =
             if is_finite(tangent_displacement) { tangent_displacement } else { Vec3::zero() };
         self.history.tangent_stiffness = tangent_stiffness;

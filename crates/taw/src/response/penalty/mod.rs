@@ -125,60 +125,58 @@ where
     ) {
         let PenaltyScratch { before, forces, loads, followed, pushes, depths } = scratch;
         std::mem::swap(before, histories);
-        histories.clear();
+        self.prepare(marbles, contacts, before, forces, depths);
+        split_masses(marbles, forces, loads, self.context.settings.dt);
+        self.solve(marbles, forces, work.as_deref_mut());
+        self.bounce_cores(marbles, forces, work.as_deref_mut());
+        self.update_positions(marbles, forces, followed);
+        self.part_overlaps(marbles, forces, pushes);
+        // After friction has turned the marbles: what it adds in a substep is resisted in the same one.
+        solve_rolling(marbles, forces, work.as_deref_mut());
+        self.store_histories(marbles, forces, histories, work);
+        list_impulses(forces, contacts);
+        quarantine_non_finite(marbles, contacts, quarantined);
+    }
+
+    /// Prepares a force per active contact, walls first.
+    fn prepare(
+        &self,
+        marbles: &SolverBodies<S>,
+        contacts: &mut Contacts<S>,
+        before: &[SpringHistory<S>],
+        forces: &mut Vec<ContactForce<S>>,
+        depths: &mut Vec<S>,
+    ) {
         self.keep_sides(marbles, contacts, before);
         forces.clear();
         depths_in_walls(before, marbles.position.len(), depths);
         for (index, (a, contact)) in BodyA::of_each(contacts).enumerate() {
             if let Some(contact) = self.active_contact(marbles, a, contact, before) {
                 let initial_velocities = contact.velocities(marbles);
-                forces.push(self.contact_force(
-                    index,
-                    contact,
-                    initial_velocities,
-                    (before, depths),
-                ));
+                let history = (before, &depths[..]);
+                forces.push(self.contact_force(index, contact, initial_velocities, history));
             }
         }
-        split_masses(marbles, forces, loads, self.context.settings.dt);
-        // All forces are evaluated at the same time, so that their order does not matter.
+    }
+
+    /// Evaluates all forces at one time, so that their order does not matter, and applies them.
+    fn solve(
+        &self,
+        marbles: &mut SolverBodies<S>,
+        forces: &mut [ContactForce<S>],
+        work: Option<&mut EnergyLedger>,
+    ) {
         for force in forces.iter_mut() {
             force.solve(self.context.settings.dt);
         }
         for ContactForce { contact, impulse, .. } in forces.iter() {
             contact.apply_impulse(marbles, *impulse);
         }
-        if let Some(work) = work.as_deref_mut() {
+        if let Some(work) = work {
             for ContactForce { contact, impulse, .. } in forces.iter() {
                 contact.record_energy(marbles, *impulse, work);
             }
         }
-        self.bounce_cores(marbles, forces, work.as_deref_mut());
-        self.update_positions(marbles, forces, followed);
-        self.part_overlaps(marbles, forces, pushes);
-        // After friction has turned the marbles: what it adds in a substep is resisted in the same one.
-        for force in forces.iter_mut() {
-            force.solve_rolling(marbles);
-        }
-        for force in forces.iter() {
-            force.apply_rolling(marbles, work.as_deref_mut());
-        }
-        for force in forces.iter_mut() {
-            let contact = &force.contact;
-            force.relative_velocity = contact.relative_velocity(marbles);
-            force.velocity =
-                contact.without_spin(contact.velocities(marbles), force.relative_velocity);
-            force.ends = self.ends(force, marbles);
-        }
-        self.store_histories(marbles, forces, histories, work);
-        list_impulses(forces, contacts);
-        for contact in contacts.wm.iter().chain(&contacts.mm) {
-            quarantine_if_non_finite(marbles, contact.b, quarantined);
-        }
-        contacts
-            .mm
-            .iter()
-            .for_each(|contact| quarantine_if_non_finite(marbles, contact.a, quarantined));
     }
 
     /// Keeps marbles on the side of a wall from which they came: one that has sunk in beyond the middle
@@ -212,6 +210,14 @@ where
         histories: &mut Vec<SpringHistory<S>>,
         mut work: Option<&mut EnergyLedger>,
     ) {
+        histories.clear();
+        for force in forces.iter_mut() {
+            let contact = &force.contact;
+            force.relative_velocity = contact.relative_velocity(marbles);
+            force.velocity =
+                contact.without_spin(contact.velocities(marbles), force.relative_velocity);
+            force.ends = self.ends(force, marbles);
+        }
         for force in forces {
             let Some(history) = force.next_history(self.context.settings.dt) else { continue };
             if force.ends {
@@ -325,21 +331,40 @@ fn list_impulses<S: Scalar>(forces: &[ContactForce<S>], contacts: &mut Contacts<
     }
 }
 
-fn quarantine_if_non_finite<S: Scalar>(
+/// Solves and applies rolling and torsional friction.
+fn solve_rolling<S: Scalar>(
     marbles: &mut SolverBodies<S>,
-    row: u32,
+    forces: &mut [ContactForce<S>],
+    mut work: Option<&mut EnergyLedger>,
+) {
+    for force in forces.iter_mut() {
+        force.solve_rolling(marbles);
+    }
+    for force in forces.iter() {
+        force.apply_rolling(marbles, work.as_deref_mut());
+    }
+}
+
+/// Zeroes velocities and spins that are infinite or NaN, and lists their rows.
+fn quarantine_non_finite<S: Scalar>(
+    marbles: &mut SolverBodies<S>,
+    contacts: &Contacts<S>,
     quarantined: &mut Vec<u32>,
 ) {
-    let index = row as usize;
-    let spin = marbles.spin.get(index).copied().unwrap_or_else(Vec3::zero);
-    if is_finite(marbles.velocity[index]) && is_finite(spin) {
-        return;
+    let Contacts { wm, mm, .. } = contacts;
+    let second = wm.iter().chain(mm).map(|contact| contact.b);
+    for row in second.chain(mm.iter().map(|contact| contact.a)) {
+        let index = row as usize;
+        let spin = marbles.spin.get(index).copied().unwrap_or_else(Vec3::zero);
+        if is_finite(marbles.velocity[index]) && is_finite(spin) {
+            continue;
+        }
+        marbles.velocity[index] = Vec3::zero();
+        if let Some(spin) = marbles.spin.get_mut(index) {
+            *spin = Vec3::zero();
+        }
+        quarantined.push(row);
     }
-    marbles.velocity[index] = Vec3::zero();
-    if let Some(spin) = marbles.spin.get_mut(index) {
-        *spin = Vec3::zero();
-    }
-    quarantined.push(row);
 }
 
 /// Sets the factors of each contact by mass splitting.

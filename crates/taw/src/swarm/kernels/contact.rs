@@ -12,9 +12,10 @@ use super::{
 };
 use crate::constraint::{ContactImpulse, FrictionCone, Softness};
 use crate::math::{Kernel, LANES, RealVector, Row, Scalar, Simd, SimdLevel, Vec3Wide};
+use crate::motion::BALL_INVERSE_INERTIA;
 use crate::response::Impact;
 use crate::swarm::batches::Batch;
-use crate::swarm::surfaces::{PairNumbers, SOLID_BALL};
+use crate::swarm::surfaces::PairNumbers;
 use crate::workers::DisjointSlice;
 
 /// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
@@ -133,7 +134,7 @@ impl<L: Simd> Numbers<L> {
                 friction: L::splat(friction),
                 restitution: L::splat(restitution),
                 tangential_restitution: L::constant(0.0),
-                inertia_factors: [L::constant(SOLID_BALL); 2],
+                inertia_factors: [L::constant(BALL_INVERSE_INERTIA); 2],
             }
         }
     }

@@ -10,7 +10,6 @@ use super::{Continuous, MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMa
 use crate::broad::Period;
 use crate::contact::time_of_impact_sphere_sphere;
 use crate::math::{Mat3, Scalar, Vec3, length, normalize_and_length};
-use crate::response::Response;
 use crate::shape::Sphere;
 use crate::world::World;
 
@@ -81,7 +80,7 @@ impl<S: Scalar> World<S> {
         let marbles = &self.marbles;
         let Continuous { start, velocity, candidates, meetings, paths, bends, .. } =
             &mut self.scratch.continuous;
-        let displaces = self.settings.model.response == Response::Displacement;
+        let displaces = !self.settings.model.response.knows_masses();
         // Displacement changes along the path by itself, and has no normals to get right.
         let min_motion = S::from_f64(if displaces { MAX_FREE_MOTION } else { MIN_GRAZING_MOTION });
         let smallest = marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
@@ -128,7 +127,7 @@ impl<S: Scalar> World<S> {
         let Continuous { middle, reach, fast, candidates, meetings, paths, bends, .. } =
             &mut self.scratch.continuous;
         let half = S::from_f64(0.5);
-        let knows_masses = self.settings.model.response != Response::Displacement;
+        let knows_masses = self.settings.model.response.knows_masses();
         let smallest = self.marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
         fast.clear();
         fast.extend(paths.iter().map(|path| {

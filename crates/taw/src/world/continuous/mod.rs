@@ -17,7 +17,6 @@ use cgmath::Zero;
 use super::{Detection, Model, World};
 use crate::contact::Contact;
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
-use crate::response::Response;
 use crate::response::penalty::WallStop;
 use marbles::{Meeting, Partners, Path};
 pub(super) use moving_walls::{Frame, MovingWall, RelativePath};
@@ -138,8 +137,7 @@ impl<S: Scalar> World<S> {
     pub(super) fn begin_pushes(&mut self) {
         self.scratch.continuous.bounced_from.clear();
         let Model { detection, response, .. } = self.settings.model;
-        let never_passes = matches!(response, Response::EventDriven | Response::Displacement);
-        if detection == Detection::Swept || never_passes {
+        if detection == Detection::Swept || response.never_passes_walls() {
             self.store_positions_before_contacts();
         }
     }

@@ -9,8 +9,8 @@ use super::{MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer}
 use crate::broad::CollisionFilter;
 use crate::contact::time_to_close;
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
+use crate::response::Colliders as _;
 use crate::response::penalty::CORE;
-use crate::response::{Colliders as _, Response};
 use crate::shape::{Aabb, PointProjection, Sphere};
 use crate::world::narrow_phase::flush_distance;
 use crate::world::walls::{SubShape, Walls};
@@ -124,8 +124,7 @@ impl<S: Scalar> World<S> {
     /// Returns true for a marble of infinite mass, which contacts do not move, if the response knows
     /// masses.
     pub(super) fn is_kinematic(&self, row: usize) -> bool {
-        self.settings.model.response != Response::Displacement
-            && self.marbles.mass(row).is_infinite()
+        self.settings.model.response.knows_masses() && self.marbles.mass(row).is_infinite()
     }
 
     /// Motion of a marble against a wall that needs no sweep, in metres: beyond this it may pass.
