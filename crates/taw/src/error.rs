@@ -3,7 +3,7 @@ use std::fmt;
 use cgmath::{Array, InnerSpace};
 
 use crate::frame::NodeId;
-use crate::handle::{BallId, MarbleId, SensorId, WallId};
+use crate::handle::{BallId, JointId, MarbleId, SensorId, WallId};
 use crate::math::{Point3, Quat, Scalar, Vec3, length};
 
 /// Reason why an input was rejected. A function that returns one has changed nothing.
@@ -77,6 +77,15 @@ pub enum Error {
     /// No sensor has this handle: it was removed, or belongs to another world.
     #[error("no sensor has the handle {0:?}")]
     NoSuchSensor(SensorId),
+    /// No joint has this handle: it was removed, broke, or belongs to another world.
+    #[error("no joint has the handle {0:?}")]
+    NoSuchJoint(JointId),
+    /// A joint holds no marble.
+    #[error("none of the two ends of a joint is a marble")]
+    NoMarble,
+    /// Both ends of a joint are one marble.
+    #[error("a joint joins the marble {0:?} to itself")]
+    JoinedToItself(MarbleId),
     /// No node has this handle: it was removed, or belongs to another tree.
     #[error("no node has the handle {0:?}")]
     NoSuchNode(NodeId),

@@ -60,6 +60,7 @@ pub mod contact;
 mod error;
 pub mod frame;
 mod handle;
+pub mod joint;
 pub mod math;
 pub mod motion;
 pub mod response;

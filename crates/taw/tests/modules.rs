@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From what everything uses to what uses everything.
-const ORDER: [&str; 14] = [
+const ORDER: [&str; 15] = [
     "uncompared",
     "math",
     "handle",
@@ -18,6 +18,7 @@ const ORDER: [&str; 14] = [
     "broad",
     "motion",
     "constraint",
+    "joint",
     "response",
     "swarm",
     "world",

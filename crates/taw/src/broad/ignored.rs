@@ -12,7 +12,7 @@ pub(crate) struct IgnoredPairs {
     pub walls: Vec<[u32; 2]>,
     /// Number of marbles and of walls, and of removals of both, when they were found; none while others
     /// are named.
-    pub found_at: Option<[u64; 4]>,
+    pub found_at: Option<([u64; 2], [u64; 3])>,
 }
 
 impl IgnoredPairs {

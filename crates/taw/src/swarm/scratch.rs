@@ -8,6 +8,7 @@ use super::recorded_impulses::RecordedImpulses;
 use super::state::of;
 use super::step::{SavedPlace, WayToWall};
 use super::sweeps::Crowd;
+use crate::joint::JointSystem;
 use crate::math::{Row, Scalar, UnionFind};
 use crate::response::Impact;
 
@@ -70,6 +71,8 @@ pub(super) struct SwarmScratch<S> {
     pub impacts: Vec<Impact<S>>,
     /// Impulse and work on each ball in the step, if they are recorded: by slot.
     pub outside_work: Vec<OutsideWork>,
+    /// Joints of the step.
+    pub joints: JointSystem,
     /// Impulses of contacts in the step, if they are recorded.
     pub recorded_impulses: Option<RecordedImpulses<S>>,
 }
@@ -88,9 +91,6 @@ impl<S: Scalar> SwarmScratch<S> {
             lists,
             chunk_states,
             searches,
-            threads: _,
-            filters_changed: _,
-            contacts_forgotten: _,
             idle_marked_at: _,
             waking,
             islands,
@@ -102,7 +102,6 @@ impl<S: Scalar> SwarmScratch<S> {
             path_changes,
             places,
             kinematic_paths,
-            substep: _,
             ways_to_walls,
             ways_of_chunks,
             with_ways,
@@ -110,10 +109,14 @@ impl<S: Scalar> SwarmScratch<S> {
             impacts,
             outside_work,
             recorded_impulses,
+            joints: _, // lent for a step
+            threads: _,
+            filters_changed: _,
+            contacts_forgotten: _,
+            substep: _,
         } = self;
         ([column, backing].map(of).iter().sum::<usize>()
-            + of(backing_speed)
-            + of(leaving)
+            + (of(backing_speed) + of(leaving))
             + of(displacements)
             + of(proxy_rows)
             + of(saved_proxies))

@@ -61,7 +61,7 @@ impl<S: Scalar> Marbles<S> {
 
 impl<S: Scalar> World<S> {
     /// Returns true if a marble collides with another marble or a wall where they meet: their layers
-    /// interact, none of the two [names the other](Marbles::set_ignored), and it is no
+    /// interact, none of the two [names the other](Marbles::set_ignored), no joint keeps them apart, and it is no
     /// [one-way wall](super::Walls::set_one_way) that let the marble pass in the last substep. A marble
     /// does not collide with itself.
     ///
@@ -72,7 +72,9 @@ impl<S: Scalar> World<S> {
         let interact = self.layers(own)?.interacts_with(self.layers(other)?);
         let names = |id, other| self.marbles.ignored(id).is_ok_and(|them| them.contains(&other));
         let passes = match other {
-            ColliderId::Marble(id) => id == marble || names(id, own),
+            ColliderId::Marble(id) => {
+                id == marble || names(id, own) || self.joints.ignores(marble, other)
+            }
             ColliderId::Wall(wall) => self.lets_pass(wall, marble),
         };
         Ok(interact && !passes && !names(marble, other))
@@ -84,7 +86,8 @@ impl<S: Scalar> World<S> {
     pub(super) fn find_ignored_rows(&mut self) {
         let (marbles, walls) = (&self.marbles, &self.walls);
         let counts = [marbles.len() as u64, walls.len() as u64];
-        let now = Some([counts[0], counts[1], marbles.removals(), walls.removals()]);
+        let versions = [marbles.removals(), walls.removals(), self.joints.version];
+        let now = Some((counts, versions));
         if self.marbles.ignored_rows.found_at == now {
             return;
         }
@@ -97,6 +100,11 @@ impl<S: Scalar> World<S> {
                     ColliderId::Wall(wall) => (&mut of_walls, self.walls.row(wall)),
                 };
                 pairs.extend(other.map(|other| [row as u32, other as u32]));
+            }
+        }
+        for pair in self.joints.ignored_pairs() {
+            if let [Ok(a), Ok(b)] = pair.map(|id| self.marbles.row(id)) {
+                of_marbles.push([a as u32, b as u32]);
             }
         }
         for OneWayState { wall, marble, .. } in self.memory.one_way.iter().filter(|it| !it.held) {

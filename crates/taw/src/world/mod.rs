@@ -15,6 +15,7 @@ mod first_touch;
 mod ignored;
 mod impulse;
 mod integrate;
+mod joints;
 mod lasting_contacts;
 mod limits;
 mod marble;
@@ -68,6 +69,7 @@ use crate::Error;
 use crate::broad::{Grid, Period};
 use crate::contact::Contacts;
 use crate::error::{finite, finite_vector, positive};
+use crate::joint::Joints;
 use crate::math::{Point3, Scalar, Vec3, length};
 use crate::motion::{ForceField, Rotation};
 use crate::response::Impact;
@@ -91,6 +93,8 @@ pub struct World<S: Scalar> {
     /// Particle system of balls, which collide with walls, marbles and each other. (Their contacts
     /// are not listed.)
     pub swarm: Swarm<S>,
+    /// Joints between marbles, and between a marble and a place in the world.
+    pub joints: Joints<S>,
     /// Sensors: shapes that tell which marbles enter and leave.
     pub sensors: Sensors<S>,
     /// Contacts of the last substep, except those of marbles [asleep](Self::is_asleep) with each

@@ -74,6 +74,7 @@ impl<S: Scalar> World<S> {
     /// Checks that the response supports all marbles: their shapes, and their numbers.
     pub(crate) fn check_shapes(&self) -> Result<(), Error> {
         self.check_period(self.marbles.period)?;
+        self.check_joints()?;
         self.check_rows()?;
         match self.marbles.first_capsule() {
             Some(id) if !self.settings.model.response.knows_capsules() => {

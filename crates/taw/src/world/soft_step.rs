@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 
 use cgmath::{EuclideanSpace, Zero};
 
+use super::joints::JointedBodies;
 use super::method::{Method, SleepUnit};
 use super::soft_impacts::{ChunkContacts, PredictedImpacts, drop_listed_twice};
 use super::swarm::clamped_row;
@@ -31,8 +32,9 @@ pub(super) struct SoftRows<S> {
     /// material: others change the rows of all.
     known: Option<(u64, usize, Rotation, bool)>,
     token: SyncToken,
-    slot_of_marble: Vec<u32>,
+    pub slot_of_marble: Vec<u32>,
     pub marble_of_slot: Vec<u32>,
+    pub jointed: JointedBodies,
     changed: Vec<Body<S>>,
     lists: Vec<ChunkContacts<S>>,
     /// Length of the step that was integrated, in seconds.
@@ -93,6 +95,7 @@ impl<S: Scalar> World<S> {
             self.quarantine_non_finite();
         }
         self.scratch.soft_step.dt = dt;
+        self.find_jointed();
         self.sync_bodies()?;
         self.scratch.accelerations.clear();
         if !self.settings.forces.is_empty() || self.marbles.accelerate_differently() {
@@ -185,6 +188,7 @@ impl<S: Scalar> World<S> {
         self.sync_bodies()?; // somebody may have moved some since the first verb
         self.walls.update_tree();
         self.audit_rows_before();
+        self.give_joints(dt);
         let walls = SweptWalls::new(&self.walls, dt);
         if is_changed || !self.swarm.is_prepared() {
             self.swarm.prepare(dt, self.settings.gravity, &walls, identity);
@@ -201,6 +205,7 @@ impl<S: Scalar> World<S> {
         let turns = self.settings.model.rotation == Rotation::Dynamic;
         let columns = self.marbles.body_columns(turns);
         self.swarm.read_bodies(marbles, columns, Some(dt), &mut self.scratch.stopped);
+        self.take_joints();
         self.quarantine_stopped();
         self.list_impacts(dt);
         self.audit_rows_after();
@@ -341,7 +346,7 @@ impl<S: Scalar> World<S> {
     fn find_changes(&mut self, rows: &[u32]) {
         let (marbles, rotation) = (&self.marbles, self.settings.model.rotation);
         let plain_swarm = self.swarm.model().material == Material::default();
-        let SoftRows { slot_of_marble, changed, .. } = &mut self.scratch.soft_step;
+        let SoftRows { slot_of_marble, changed, jointed, .. } = &mut self.scratch.soft_step;
         changed.clear();
         for row in rows.iter().map(|row| *row as usize) {
             let Some(slot) = slot_of_marble.get(row).copied().filter(|slot| *slot != NO_ROW) else {
@@ -362,7 +367,8 @@ impl<S: Scalar> World<S> {
             };
             let mass = marbles.mass(row);
             let inverse_mass = inverse_mass(mass);
-            let sleepless = marbles.own.sleeping_disabled.get(row).is_some();
+            let sleepless = marbles.own.sleeping_disabled.get(row).is_some()
+                || jointed.is_jointed.get(row) == Some(&true);
             let numbers = [row_radius(marble.radius), inverse_mass];
             let layers = marbles.layers_of_row(row);
             let is_kinematic = mass.is_infinite();

@@ -208,6 +208,7 @@ impl<S: Scalar> World<S> {
         self.quarantined.clear();
         self.impacts.clear();
         self.sensors.begin_step();
+        self.joints.begin_step(|id| self.marbles.row(id).is_ok());
         self.reset_audit();
     }
 
@@ -228,6 +229,7 @@ impl<S: Scalar> World<S> {
         self.walls.finish_step();
         self.marbles.clear_forces();
         self.swarm.clear_accelerations();
+        self.joints.end_step();
         self.sense_balls();
     }
 }

@@ -4,6 +4,7 @@ mod backing;
 mod bounces;
 mod cluster;
 mod islands;
+mod joints;
 mod lab;
 mod overflow;
 mod passages;
@@ -221,9 +222,7 @@ impl<S: Scalar> Swarm<S> {
             self.advance_proxies(parts, false, zero);
             observe(Stage::Restitute);
             self.find_backing();
-            self.pass(Pass::WarmStart(params), |_, _| true);
-            self.pass(Pass::Solve(params), |_, _| true);
-            self.solve_unconverged(&params);
+            self.solve_contacts_and_joints(&params, h / substeps);
             self.record_contact_impulses(S::one());
             observe(Stage::Integrate);
             self.end_swift_paths([dt, h, left], walls, observe);
@@ -243,7 +242,7 @@ impl<S: Scalar> Swarm<S> {
                 self.update_wall_contacts(walls, left, times, |chunk| chunk.caught, true);
             }
             observe(Stage::Restitute);
-            self.relax_recorded(params);
+            self.relax_contacts_and_joints(params);
             self.record_borne();
             self.forget_impacts();
             self.keep_out(walls, [before, left]);

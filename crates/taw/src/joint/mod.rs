@@ -1,0 +1,483 @@
+//! Joints between marbles, and between a marble and a place in the world: what a joint is, its rows, and their
+//! solution.
+//!
+//! Each kind of joint is a list of rows: a position error `C`, and its Jacobian `J`, by which velocities of the
+//! two ends change it (`rows.rs`). All rows of a world are solved at once, as the linear system
+//! `J M⁻¹ Jᵀ λ = b` of the impulses `λ` (`system.rs`), by a sparse factorization (`sparse_ldl.rs`; Baraff,
+//! *Linear-time dynamics using Lagrange multipliers*, 1996). So a chain holds whatever hangs on it.
+//!
+//! A substep first finds impulses by which `C` is zero at its end, along the directions at its begin, and then,
+//! at its end, those by which `J v` is zero: RATTLE (Andersen, 1983), which is of second order, and keeps energy.
+
+mod body;
+mod elimination;
+mod energy;
+mod inertia;
+mod rows;
+mod sparse_ldl;
+mod spring;
+mod system;
+
+pub use crate::handle::JointId;
+
+use crate::Error;
+use crate::error::{finite, positive, within};
+use crate::frame::Pose;
+use crate::handle::{Handles, MarbleId};
+use crate::math::{Point3, Quat, Scalar, Vec3};
+pub(crate) use body::JointBody;
+pub(crate) use system::{JointSystem, SystemJoint};
+
+/// End of a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JointEnd<S> {
+    /// Marble, and the frame of the joint relative to its center and its rotation.
+    Marble {
+        /// The marble.
+        marble: MarbleId,
+        /// Frame of the joint in that of the marble.
+        frame: Pose<S>,
+    },
+    /// Place in the world. One that is [set](Joints::set) elsewhere moves there within the next step.
+    World {
+        /// Frame of the joint in the world.
+        frame: Pose<S>,
+    },
+}
+
+impl<S: Scalar> JointEnd<S> {
+    /// Anchor on a marble, relative to its center, in metres, with the axes of the marble.
+    #[must_use]
+    pub fn marble(marble: MarbleId, anchor: Vec3<S>) -> Self {
+        Self::Marble { marble, frame: Pose { translation: anchor, ..Pose::identity() } }
+    }
+
+    /// Anchor in the world, with the axes of the world.
+    #[must_use]
+    pub fn world(anchor: Point3<S>) -> Self {
+        let translation = Vec3::new(anchor.x, anchor.y, anchor.z);
+        Self::World { frame: Pose { translation, ..Pose::identity() } }
+    }
+
+    /// The same end with its frame turned.
+    #[must_use]
+    pub fn with_rotation(mut self, rotation: Quat<S>) -> Self {
+        let (Self::Marble { frame, .. } | Self::World { frame }) = &mut self;
+        frame.rotation = rotation;
+        self
+    }
+
+    /// Frame of the joint.
+    #[must_use]
+    pub fn frame(&self) -> Pose<S> {
+        let (Self::Marble { frame, .. } | Self::World { frame }) = self;
+        *frame
+    }
+
+    /// The marble, if it is one.
+    #[must_use]
+    pub fn marble_id(&self) -> Option<MarbleId> {
+        match self {
+            Self::Marble { marble, .. } => Some(*marble),
+            Self::World { .. } => None,
+        }
+    }
+}
+
+/// Spring and damper, by the motion of the two ends if nothing else moved them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointSpring<S> {
+    /// Oscillations per second without damping, above zero.
+    pub frequency: S,
+    /// Damping over that of the fastest decay without oscillation (critical damping); at least zero.
+    pub damping_ratio: S,
+}
+
+/// Drive of the free axis of a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JointMotor<S> {
+    /// Holds a speed. With a speed of zero, it is a brake, or the friction of the joint.
+    Speed {
+        /// Target, in rad/s, or m/s along a slider.
+        target: S,
+        /// Largest torque in N m, or force in N.
+        max: S,
+    },
+    /// Holds a position by a spring.
+    Position {
+        /// Target, in rad from −π to π, or m along a slider.
+        target: S,
+        /// The spring.
+        spring: JointSpring<S>,
+        /// Largest torque in N m, or force in N.
+        max: S,
+    },
+}
+
+/// Free axis of a joint: what limits and drives it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointDrive<S> {
+    /// Least and largest position, in rad within [−π, π], or m along a slider.
+    pub limits: Option<[S; 2]>,
+    /// Its motor.
+    pub motor: Option<JointMotor<S>>,
+}
+
+impl<S> Default for JointDrive<S> {
+    fn default() -> Self {
+        Self { limits: None, motor: None }
+    }
+}
+
+/// Kind of a joint: which motions it leaves free. The frames of both ends coincide where it is at zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JointKind<S> {
+    /// Ball-and-socket joint: anchors coincide.
+    BallAndSocket,
+    /// Hinge about z (revolute joint).
+    Hinge(JointDrive<S>),
+    /// Slider along x of the first end (prismatic joint).
+    Slider(JointDrive<S>),
+    /// No motion (weld).
+    Fixed,
+    /// Distance of the anchors within a range, in metres: a rod for two equal bounds, a rope from zero on.
+    Distance([S; 2]),
+    /// Spring between the anchors, of this length in metres where it is at rest.
+    Spring {
+        /// Length at rest, in metres.
+        length: S,
+        /// Frequency and damping.
+        spring: JointSpring<S>,
+    },
+    /// Wheel: it turns about z, and moves along x of the first end on a spring.
+    Wheel {
+        /// Suspension.
+        spring: JointSpring<S>,
+        /// Least and largest way of the suspension, in metres.
+        travel: [S; 2],
+        /// Drive of the turning.
+        drive: JointDrive<S>,
+    },
+    /// Gear: the first end turns about its z by `−ratio` times the turn of the second about its own z.
+    Gear {
+        /// Ratio of the two, other than zero; negative for a belt.
+        ratio: S,
+    },
+}
+
+/// Joint of two marbles, or of a marble and a place in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joint<S> {
+    /// Its ends.
+    pub ends: [JointEnd<S>; 2],
+    /// Motions that it leaves free.
+    pub kind: JointKind<S>,
+    /// True if two marbles that it joins collide with each other.
+    pub collides: bool,
+    /// Force in N from which on it breaks; infinite for never.
+    pub breaking_force: S,
+    /// Torque in N m from which on it breaks; infinite for never.
+    pub breaking_torque: S,
+}
+
+impl<S: Scalar> Joint<S> {
+    /// Joint that never breaks, and whose marbles do not collide with each other.
+    #[must_use]
+    pub fn new(kind: JointKind<S>, ends: [JointEnd<S>; 2]) -> Self {
+        let never = S::infinity();
+        Self { ends, kind, collides: false, breaking_force: never, breaking_torque: never }
+    }
+
+    /// Validates all numbers.
+    fn validated(mut self) -> Result<Self, Error> {
+        for end in &mut self.ends {
+            let (JointEnd::Marble { frame, .. } | JointEnd::World { frame }) = end;
+            *frame = frame.validated()?;
+        }
+        match self.ends.map(|end| end.marble_id()) {
+            [None, None] => return Err(Error::NoMarble),
+            [Some(a), Some(b)] if a == b => return Err(Error::JoinedToItself(a)),
+            _ => {}
+        }
+        for (field, value) in
+            [("breaking_force", self.breaking_force), ("breaking_torque", self.breaking_torque)]
+        {
+            within(field, value, S::zero(), S::infinity())?;
+        }
+        self.kind.validate()?;
+        Ok(self)
+    }
+}
+
+impl<S: Scalar> JointKind<S> {
+    fn validate(&self) -> Result<(), Error> {
+        match self {
+            Self::BallAndSocket | Self::Fixed => Ok(()),
+            Self::Hinge(drive) => drive.validate("limits", S::from_f64(std::f64::consts::PI)),
+            Self::Slider(drive) => drive.validate("limits", S::max_value()),
+            Self::Distance(range) => ordered("range", *range, [S::zero(), S::infinity()]),
+            Self::Spring { length, spring } => {
+                within("length", *length, S::zero(), S::max_value())?;
+                spring.validate()
+            }
+            Self::Wheel { spring, travel, drive } => {
+                spring.validate()?;
+                ordered("travel", *travel, [S::neg_infinity(), S::infinity()])?;
+                drive.validate("limits", S::from_f64(std::f64::consts::PI))
+            }
+            Self::Gear { ratio } => {
+                finite("ratio", *ratio)?;
+                positive("ratio", ratio.abs()).map(|_| ())
+            }
+        }
+    }
+}
+
+/// Validates a least and a largest number.
+fn ordered<S: Scalar>(field: &'static str, [low, high]: [S; 2], all: [S; 2]) -> Result<(), Error> {
+    within(field, low, all[0], all[1])?;
+    within(field, high, low, all[1]).map(|_| ())
+}
+
+impl<S: Scalar> JointDrive<S> {
+    fn validate(&self, field: &'static str, most: S) -> Result<(), Error> {
+        if let Some(limits) = self.limits {
+            ordered(field, limits, [-most, most])?;
+        }
+        let max = match self.motor {
+            None => return Ok(()),
+            Some(JointMotor::Speed { target, max }) => {
+                finite("motor.target", target)?;
+                max
+            }
+            Some(JointMotor::Position { target, spring, max }) => {
+                within("motor.target", target, -most, most)?;
+                spring.validate()?;
+                max
+            }
+        };
+        within("motor.max", max, S::zero(), S::infinity()).map(|_| ())
+    }
+}
+
+impl<S: Scalar> JointSpring<S> {
+    fn validate(&self) -> Result<(), Error> {
+        positive("frequency", self.frequency)?;
+        within("damping_ratio", self.damping_ratio, S::zero(), S::max_value()).map(|_| ())
+    }
+}
+
+/// State of a joint besides its definition.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct JointState<S> {
+    pub joint: Joint<S>,
+    /// Frames at the end of the last step of ends in the world.
+    pub frames_before: [Pose<S>; 2],
+    /// Impulses of its rows in the last substep, in N s or N m s.
+    pub impulses: [f64; rows::MAX_ROWS],
+    /// Turn by which a gear is off, in rad.
+    pub slip: f64,
+    /// Impulse of its force in the last substep, in N s.
+    pub pull: f64,
+    /// Kinetic energy that its group has gained, in J.
+    pub gain: f64,
+    /// Largest force in N and torque in N m of the last step.
+    pub load: [S; 2],
+}
+
+/// Joints of a world, which only [`SoftStep`](crate::response::Response::SoftStep) knows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Joints<S> {
+    handles: Handles,
+    pub(crate) states: Vec<JointState<S>>,
+    /// Joints that broke in the last step.
+    broken: Vec<JointId>,
+    /// Number of changes of joints that are there, and of what they join.
+    pub(crate) version: u64,
+}
+
+impl<S: Scalar> Joints<S> {
+    /// Adds a joint. One of marbles that are not there is taken out in the next step.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] or [`Error::NotUnit`] for a frame; [`Error::NoMarble`] for two places in the world;
+    /// [`Error::JoinedToItself`] for a marble joined to itself; [`Error::OutOfRange`], [`Error::NotPositive`] or
+    /// [`Error::NotFinite`] for a number of its kind; [`Error::Full`] at 2³² − 1 joints.
+    pub fn insert(&mut self, joint: Joint<S>) -> Result<JointId, Error> {
+        let joint = joint.validated()?;
+        let id = JointId(self.handles.push()?);
+        self.states.push(JointState {
+            frames_before: joint.ends.map(|end| end.frame()),
+            joint,
+            impulses: [0.0; rows::MAX_ROWS],
+            slip: 0.0,
+            pull: 0.0,
+            gain: 0.0,
+            load: [S::zero(); 2],
+        });
+        self.version += 1;
+        Ok(id)
+    }
+
+    /// Changes a joint. An end in the world moves to its new frame within the next step; one that was of a
+    /// marble before is there at once.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchJoint`], and those of [`Self::insert`].
+    pub fn set(&mut self, id: JointId, joint: Joint<S>) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let joint = joint.validated()?;
+        let state = &mut self.states[row];
+        let before = std::mem::replace(&mut state.joint, joint);
+        for (at, frame) in state.frames_before.iter_mut().enumerate() {
+            let was_world = matches!(before.ends[at], JointEnd::World { .. });
+            if !was_world || matches!(joint.ends[at], JointEnd::Marble { .. }) {
+                *frame = joint.ends[at].frame();
+            }
+        }
+        let same_bodies = before.ends.map(|end| end.marble_id())
+            == joint.ends.map(|end| end.marble_id())
+            && before.collides == joint.collides;
+        if !same_bodies || rows::count(&before.kind) != rows::count(&joint.kind) {
+            state.impulses = [0.0; rows::MAX_ROWS];
+            self.version += 1;
+        }
+        Ok(())
+    }
+
+    /// Takes a joint out.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchJoint`].
+    pub fn remove(&mut self, id: JointId) -> Result<Joint<S>, Error> {
+        let row = self.handles.swap_remove(id.0).ok_or(Error::NoSuchJoint(id))?;
+        self.version += 1;
+        Ok(self.states.swap_remove(row).joint)
+    }
+
+    /// Joint as it was set.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchJoint`].
+    pub fn get(&self, id: JointId) -> Result<&Joint<S>, Error> {
+        Ok(&self.states[self.row(id)?].joint)
+    }
+
+    /// Largest force between its ends in the last step, in N: the mean over a substep.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchJoint`].
+    pub fn force(&self, id: JointId) -> Result<S, Error> {
+        Ok(self.states[self.row(id)?].load[0])
+    }
+
+    /// Largest torque between its ends in the last step, in N m: the mean over a substep.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchJoint`].
+    pub fn torque(&self, id: JointId) -> Result<S, Error> {
+        Ok(self.states[self.row(id)?].load[1])
+    }
+
+    /// Handles of all joints.
+    pub fn ids(&self) -> impl Iterator<Item = JointId> + '_ {
+        (0..self.states.len()).filter_map(|row| self.handles.handle(row).map(JointId))
+    }
+
+    /// Joints that broke in the last step, which are taken out.
+    #[must_use]
+    pub fn broken(&self) -> &[JointId] {
+        &self.broken
+    }
+
+    /// Number of joints.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.states.len()
+    }
+
+    /// Returns true if there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.states.is_empty()
+    }
+
+    fn row(&self, id: JointId) -> Result<usize, Error> {
+        self.handles.row(id.0).ok_or(Error::NoSuchJoint(id))
+    }
+
+    /// Takes out joints of marbles that are gone, and forgets which broke.
+    pub(crate) fn begin_step(&mut self, is_there: impl Fn(MarbleId) -> bool) {
+        self.broken.clear();
+        self.remove_where(|state| {
+            let marbles = state.joint.ends.iter().filter_map(JointEnd::marble_id);
+            marbles.into_iter().any(|marble| !is_there(marble))
+        });
+    }
+
+    /// Takes out joints whose load was too much, and remembers which.
+    pub(crate) fn end_step(&mut self) {
+        for state in &mut self.states {
+            state.frames_before = state.joint.ends.map(|end| end.frame());
+        }
+        self.broken = self.remove_where(|JointState { joint, load: [force, torque], .. }| {
+            *force > joint.breaking_force || *torque > joint.breaking_torque
+        });
+    }
+
+    fn remove_where(&mut self, goes: impl Fn(&JointState<S>) -> bool) -> Vec<JointId> {
+        let rows = (0..self.states.len()).filter(|row| goes(&self.states[*row]));
+        let ids: Vec<_> = rows.filter_map(|row| self.handles.handle(row).map(JointId)).collect();
+        for id in &ids {
+            let _ = self.remove(*id); // it is there
+        }
+        ids
+    }
+}
+
+impl<S: Scalar> JointState<S> {
+    /// Kind in the numbers of the solver.
+    pub(crate) fn kind(&self) -> JointKind<f64> {
+        self.joint.kind.cast()
+    }
+}
+
+impl<S: Scalar> JointKind<S> {
+    fn cast(&self) -> JointKind<f64> {
+        let number = |x: S| x.as_f64();
+        let spring = |it: JointSpring<S>| JointSpring {
+            frequency: number(it.frequency),
+            damping_ratio: number(it.damping_ratio),
+        };
+        let motor = |it: JointMotor<S>| match it {
+            JointMotor::Speed { target, max } => {
+                JointMotor::Speed { target: number(target), max: number(max) }
+            }
+            JointMotor::Position { target, spring: it, max } => JointMotor::Position {
+                target: number(target),
+                spring: spring(it),
+                max: number(max),
+            },
+        };
+        let drive = |it: JointDrive<S>| JointDrive {
+            limits: it.limits.map(|limits| limits.map(number)),
+            motor: it.motor.map(motor),
+        };
+        match *self {
+            Self::BallAndSocket => JointKind::BallAndSocket,
+            Self::Hinge(it) => JointKind::Hinge(drive(it)),
+            Self::Slider(it) => JointKind::Slider(drive(it)),
+            Self::Fixed => JointKind::Fixed,
+            Self::Distance(range) => JointKind::Distance(range.map(number)),
+            Self::Spring { length, spring: it } => {
+                JointKind::Spring { length: number(length), spring: spring(it) }
+            }
+            Self::Wheel { spring: it, travel, drive: turning } => JointKind::Wheel {
+                spring: spring(it),
+                travel: travel.map(number),
+                drive: drive(turning),
+            },
+            Self::Gear { ratio } => JointKind::Gear { ratio: number(ratio) },
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Joints of bodies, within a substep: before contacts and after them, so that both hold.
+
+use cgmath::Zero;
+
+use crate::handle::NO_ROW;
+use crate::joint::{JointBody, JointSystem};
+use crate::math::{Row, Scalar, Vec3, cast_vector};
+use crate::swarm::Swarm;
+use crate::swarm::kernels::{Pass, SolverParams};
+use crate::swarm::wall_contact::xyz;
+
+impl<S: Scalar> Swarm<S> {
+    /// Sets the joints of the next step, between bodies by their slots.
+    pub(crate) fn set_joints(&mut self, joints: JointSystem) {
+        self.scratch.joints = joints;
+    }
+
+    /// Takes the joints back after the step.
+    pub(crate) fn take_joints(&mut self) -> JointSystem {
+        std::mem::take(&mut self.scratch.joints)
+    }
+
+    /// Returns true if there are joints.
+    fn has_joints(&self) -> bool {
+        !self.scratch.joints.is_empty()
+    }
+
+    /// Solves contacts and joints: joints before contacts, which then know what these bear, and after them.
+    /// `share` is the length of a substep over the number of substeps in a step.
+    pub(super) fn solve_contacts_and_joints(&mut self, params: &SolverParams<S>, share: S) {
+        let h = params.time.as_f64();
+        self.pass(Pass::WarmStart(*params), |_, _| true);
+        if self.has_joints() {
+            self.find_falls(params.time, share);
+            self.with_joints(|joints| joints.begin(h));
+        }
+        self.pass(Pass::Solve(*params), |_, _| true);
+        self.solve_unconverged(params);
+        self.with_joints(|joints| joints.solve(h));
+    }
+
+    /// Makes velocities at the end of a substep those that contacts and joints allow.
+    pub(super) fn relax_contacts_and_joints(&mut self, params: SolverParams<S>) {
+        let h = params.time.as_f64();
+        self.with_joints(|joints| {
+            joints.advance(h);
+            joints.begin_relaxation(h);
+        });
+        self.relax_recorded(params);
+        self.with_joints(|joints| joints.finish_relaxation(h));
+    }
+
+    /// Finds how far bodies move in a substep of `h` seconds besides by their velocities, as positions are
+    /// integrated.
+    fn find_falls(&mut self, h: S, share: S) {
+        let gravity = self.gravity.unwrap_or_else(Vec3::zero);
+        let half = S::from_f64(-0.5);
+        let mut joints = std::mem::take(&mut self.scratch.joints);
+        for body in joints.bodies.iter_mut().filter(|body| body.slot != NO_ROW) {
+            let row = self.ids.rows()[body.slot as usize] as usize;
+            body.fall = Vec3::zero();
+            if self.spin[row][3] == S::zero() {
+                body.fall += cast_vector(gravity * (half * h * h));
+                let own =
+                    self.velocity_changes.binary_search_by_key(&body.slot, |change| change.slot);
+                if let Ok(own) = own {
+                    let change = Vec3::from(self.velocity_changes[own].change);
+                    body.fall += cast_vector(change * (half * share));
+                }
+            }
+        }
+        self.scratch.joints = joints;
+    }
+
+    /// Reads places and velocities of the bodies, does something with the joints, and writes velocities back.
+    fn with_joints(&mut self, action: impl FnOnce(&mut JointSystem)) {
+        if !self.has_joints() {
+            return;
+        }
+        let mut joints = std::mem::take(&mut self.scratch.joints);
+        let rows = self.ids.rows();
+        for body in joints.bodies.iter_mut().filter(|body| body.slot != NO_ROW) {
+            let row = rows[body.slot as usize] as usize;
+            let at = self.at[row];
+            body.pose.translation = cast_vector(xyz(&at));
+            body.velocity = cast_vector(xyz(&self.velocity[row]));
+            // In f64, so that a spin that nobody changes keeps its bits.
+            body.spin = cast_vector::<S, f64>(xyz(&self.spin[row])) / at[3].as_f64();
+        }
+        action(&mut joints);
+        for body in joints.bodies.iter().filter(|body| body.slot != NO_ROW) {
+            let row = rows[body.slot as usize] as usize;
+            let JointBody { velocity, spin, inverse_mass, inverse_inertia, .. } = body;
+            let radius = self.at[row][3].as_f64();
+            if *inverse_mass > 0.0 {
+                set(&mut self.velocity[row], cast_vector(*velocity));
+            }
+            if *inverse_inertia > 0.0 {
+                set(&mut self.spin[row], cast_vector(*spin * radius));
+            }
+        }
+        self.scratch.joints = joints;
+    }
+}
+
+/// Sets the vector of a row.
+fn set<S: Scalar>(row: &mut Row<S>, Vec3 { x, y, z }: Vec3<S>) {
+    *row = [x, y, z, row[3]];
+}

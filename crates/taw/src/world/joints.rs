@@ -1,0 +1,197 @@
+//! Joints of a world: between marbles as rows, within the third verb of
+//! [`SoftStep`](crate::response::Response::SoftStep).
+
+use std::collections::BTreeMap;
+
+use cgmath::{EuclideanSpace, Zero};
+
+use super::soft_step::inverse_mass;
+use super::{ColliderId, MarbleId, World};
+use crate::Error;
+use crate::frame::Pose;
+use crate::handle::NO_ROW;
+use crate::joint::{JointBody, JointEnd, JointSystem, Joints, SystemJoint};
+use crate::math::{Quat, Scalar, Vec3, cast_vector, normalize_and_length};
+use crate::motion::{BALL_INVERSE_INERTIA, Rotation};
+
+/// Bodies of the joints, while the joints and what they join stay the same.
+#[derive(Clone, Debug, Default)]
+pub(super) struct JointedBodies {
+    /// Versions of the joints and of the rows of the marbles.
+    known: Option<[u64; 2]>,
+    bodies: Vec<Jointed>,
+    /// True for each marble with a joint, by row; empty if there are none.
+    pub is_jointed: Vec<bool>,
+    system: JointSystem,
+}
+
+/// What a joint holds.
+#[derive(Clone, Copy, Debug)]
+enum Jointed {
+    Marble(MarbleId),
+    /// End in the world of a joint, by index.
+    Place {
+        joint: usize,
+        end: usize,
+    },
+}
+
+impl<S: Scalar> World<S> {
+    /// Refuses joints where the response has no method for them.
+    pub(super) fn check_joints(&self) -> Result<(), Error> {
+        if self.joints.is_empty() || self.settings.model.response.uses_swarm_rows() {
+            return Ok(());
+        }
+        Err(Error::Unsupported { response: "a response other than SoftStep", feature: "joints" })
+    }
+
+    /// Finds what joints hold, if that changed: those marbles do not sleep.
+    pub(super) fn find_jointed(&mut self) {
+        let now = [self.joints.version, self.marbles.removals()];
+        let jointed = &mut self.scratch.soft_step.jointed;
+        if jointed.known == Some(now) {
+            return;
+        }
+        let had_none = jointed.is_jointed.is_empty();
+        *jointed = JointedBodies { known: Some(now), ..JointedBodies::default() };
+        if self.joints.is_empty() && had_none {
+            return;
+        }
+        self.marbles.changed.add_all();
+        let mut of_marble = BTreeMap::new();
+        let mut joints = Vec::with_capacity(self.joints.len());
+        for (joint, state) in self.joints.states.iter().enumerate() {
+            let mut bodies = [0; 2];
+            for (end, body) in bodies.iter_mut().enumerate() {
+                let next = jointed.bodies.len() as u32;
+                *body = match state.joint.ends[end] {
+                    JointEnd::Marble { marble, .. } => *of_marble.entry(marble).or_insert(next),
+                    JointEnd::World { .. } => next,
+                };
+                if *body == next {
+                    jointed.bodies.push(match state.joint.ends[end] {
+                        JointEnd::Marble { marble, .. } => Jointed::Marble(marble),
+                        JointEnd::World { .. } => Jointed::Place { joint, end },
+                    });
+                }
+            }
+            joints.push(SystemJoint::new(state.kind(), bodies, [Pose::identity(); 2]));
+        }
+        jointed.is_jointed = vec![false; self.marbles.len()];
+        for row in of_marble.keys().filter_map(|id| self.marbles.row(*id).ok()) {
+            jointed.is_jointed[row] = true;
+        }
+        let place = |body: &Jointed| {
+            let place = JointBody::place(Pose::identity());
+            let slot = if matches!(body, Jointed::Marble(_)) { 0 } else { NO_ROW };
+            JointBody { slot, ..place }
+        };
+        let bodies = jointed.bodies.iter().map(place).collect();
+        jointed.system.set_structure(bodies, joints);
+    }
+
+    /// Gives the joints to the solver for a step of `dt` seconds.
+    pub(super) fn give_joints(&mut self, dt: S) {
+        self.find_jointed();
+        if self.joints.is_empty() {
+            return;
+        }
+        let mut system = std::mem::take(&mut self.scratch.soft_step.jointed.system);
+        for (body, is) in system.bodies.iter_mut().zip(&self.scratch.soft_step.jointed.bodies) {
+            match *is {
+                Jointed::Marble(id) => self.read_jointed(id, body),
+                Jointed::Place { joint, end } => {
+                    let state = &self.joints.states[joint];
+                    *body = moving_place(
+                        cast_pose(state.frames_before[end]),
+                        cast_pose(state.joint.ends[end].frame()),
+                        dt.as_f64(),
+                    );
+                }
+            }
+        }
+        for (joint, state) in system.joints.iter_mut().zip(&self.joints.states) {
+            (joint.kind, joint.impulses, joint.slip) = (state.kind(), state.impulses, state.slip);
+            (joint.load, joint.pull, joint.gain) = ([0.0; 2], state.pull, state.gain);
+            joint.frames = state.joint.ends.map(|end| match end {
+                JointEnd::Marble { frame, .. } => cast_pose(frame),
+                JointEnd::World { .. } => Pose::identity(),
+            });
+        }
+        self.swarm.set_joints(system);
+    }
+
+    /// Reads a marble that a joint holds.
+    fn read_jointed(&self, id: MarbleId, body: &mut JointBody) {
+        let Ok(row) = self.marbles.row(id) else { return };
+        let marbles = &self.marbles;
+        let mass = marbles.mass(row);
+        body.slot = self.scratch.soft_step.slot_of_marble[row];
+        body.inverse_mass = if mass.is_infinite() { 0.0 } else { inverse_mass(mass).as_f64() };
+        let turns = marbles.rotation_of(row, self.settings.model.rotation) == Rotation::Dynamic;
+        let radius = marbles.radius[row].as_f64();
+        body.radius = radius;
+        body.inverse_inertia =
+            if turns { body.inverse_mass * BALL_INVERSE_INERTIA / (radius * radius) } else { 0.0 };
+        let rotation = marbles.rotation.get(row).copied();
+        body.pose.rotation = rotation.map_or_else(|| Pose::identity().rotation, cast_rotation);
+        body.pose.translation = cast_vector(marbles.position[row].to_vec());
+    }
+
+    /// Takes the joints back from the solver: impulses, loads, and rotations of marbles.
+    pub(super) fn take_joints(&mut self) {
+        if self.joints.is_empty() {
+            return;
+        }
+        let system = self.swarm.take_joints();
+        for (joint, state) in system.joints.iter().zip(&mut self.joints.states) {
+            (state.impulses, state.slip) = (joint.impulses, joint.slip);
+            (state.pull, state.gain) = (joint.pull, joint.gain);
+            state.load = joint.load.map(S::from_f64);
+        }
+        for (body, is) in system.bodies.iter().zip(&self.scratch.soft_step.jointed.bodies) {
+            if let Jointed::Marble(id) = is
+                && body.inverse_inertia > 0.0
+                && let Ok(row) = self.marbles.row(*id)
+                && let Some(rotation) = self.marbles.rotation.get_mut(row)
+            {
+                *rotation = cast_rotation(body.pose.rotation);
+            }
+        }
+        self.scratch.soft_step.jointed.system = system;
+    }
+}
+
+impl<S: Scalar> Joints<S> {
+    /// Pairs of marbles that joints keep from colliding with each other.
+    pub(super) fn ignored_pairs(&self) -> impl Iterator<Item = [MarbleId; 2]> + '_ {
+        self.states.iter().filter(|state| !state.joint.collides).filter_map(|state| {
+            let [a, b] = state.joint.ends.map(|end| end.marble_id());
+            Some([a?, b?])
+        })
+    }
+
+    /// Returns true if a joint keeps a marble from colliding with something.
+    pub(super) fn ignores(&self, marble: MarbleId, other: ColliderId) -> bool {
+        let ColliderId::Marble(other) = other else { return false };
+        self.ignored_pairs().any(|pair| pair == [marble, other] || pair == [other, marble])
+    }
+}
+
+/// Place in the world that moves from one frame to another one in `dt` seconds.
+fn moving_place(from: Pose<f64>, to: Pose<f64>, dt: f64) -> JointBody {
+    let turn = to.rotation * from.rotation.conjugate();
+    let turn = if turn.s < 0.0 { -turn } else { turn };
+    let spin = normalize_and_length(turn.v)
+        .map_or_else(Vec3::zero, |(axis, sine)| axis * (2.0 * sine.atan2_portable(turn.s) / dt));
+    let velocity = (to.translation - from.translation) / dt;
+    JointBody { velocity, spin, ..JointBody::place(from) }
+}
+
+fn cast_rotation<S: Scalar, T: Scalar>(Quat { s, v }: Quat<S>) -> Quat<T> {
+    Quat { s: T::from_f64(s.as_f64()), v: cast_vector(v) }
+}
+
+fn cast_pose<S: Scalar>(pose: Pose<S>) -> Pose<f64> {
+    Pose { rotation: cast_rotation(pose.rotation), translation: cast_vector(pose.translation) }
+}
