@@ -20,6 +20,8 @@ mod system;
 
 pub use crate::handle::JointId;
 
+use cgmath::Zero;
+
 use crate::Error;
 use crate::error::{finite, positive, within};
 use crate::frame::Pose;
@@ -226,8 +228,8 @@ impl<S: Scalar> JointKind<S> {
                 drive.validate("limits", S::from_f64(std::f64::consts::PI))
             }
             Self::Gear { ratio } => {
-                finite("ratio", *ratio)?;
-                positive("ratio", ratio.abs()).map(|_| ())
+                let is_zero = finite("ratio", *ratio)?.is_zero();
+                if is_zero { positive("ratio", *ratio).map(|_| ()) } else { Ok(()) }
             }
         }
     }
@@ -235,8 +237,8 @@ impl<S: Scalar> JointKind<S> {
 
 /// Validates a least and a largest number.
 fn ordered<S: Scalar>(field: &'static str, [low, high]: [S; 2], all: [S; 2]) -> Result<(), Error> {
-    within(field, low, all[0], all[1])?;
-    within(field, high, low, all[1]).map(|_| ())
+    within(field, high, all[0], all[1])?;
+    within(field, low, all[0], high).map(|_| ())
 }
 
 impl<S: Scalar> JointDrive<S> {

@@ -3,7 +3,9 @@
 //!
 //! Public entries are read from the sources, so that one without a row fails the test.
 
+#[macro_use]
 mod rows;
+mod joint_rows;
 mod scenes;
 mod sources;
 
