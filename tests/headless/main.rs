@@ -5,6 +5,7 @@ mod balls;
 mod board;
 mod capsules;
 mod contact_forces;
+mod contact_points;
 mod contacts;
 mod disabling;
 mod first_contact;

@@ -104,6 +104,7 @@ mod ball;
 mod ball_sensor;
 pub mod components;
 pub mod contact_force;
+mod contact_points;
 pub mod controller;
 mod convert;
 #[cfg(feature = "debug_ui")]
@@ -173,7 +174,7 @@ pub mod prelude {
     #[cfg(feature = "mesh")]
     pub use crate::mesh_walls::{MeshShape, MeshWalls};
     pub use crate::messages::{
-        ContactEnded, ContactHit, ContactOngoing, ContactPair, ContactStarted,
+        ContactEnded, ContactHit, ContactOngoing, ContactPair, ContactPoint, ContactStarted,
     };
     #[cfg(feature = "picking")]
     pub use crate::picking::TawPickingPlugin;

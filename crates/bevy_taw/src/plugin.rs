@@ -9,6 +9,7 @@ use crate::components::{
     SurfaceMaterial, SurfaceVelocity, Teleport, Velocity,
 };
 use crate::contact_force::{ContactForce, PairImpulses};
+use crate::contact_points::{self, Points};
 use crate::controller::MarbleController;
 use crate::diagnostics::{self, StepTimes};
 use crate::grounded::Grounded;
@@ -141,6 +142,7 @@ impl Plugin for TawPlugin {
             .init_resource::<gather::ChangedMarbles>()
             .init_resource::<Touches>()
             .init_resource::<PairImpulses>()
+            .init_resource::<Points>()
             .init_resource::<Told>()
             .init_resource::<SpatialTree>()
             .init_resource::<ZoneGravity>()
@@ -286,7 +288,10 @@ fn add_scatter(app: &mut App) {
             contact_force::write.run_if(any_with_component::<ContactForce>),
             touches::write.run_if(touches::are_read),
             touches::forget.run_if(not(touches::are_read)),
+            contact_points::write.run_if(contact_points::are_read),
+            contact_points::forget.run_if(not(contact_points::are_read)),
             diagnostics::measure,
+            contact_points::trigger.run_if(contact_points::are_observed),
             touches::trigger.run_if(touches::are_observed),
         )
             .chain(),
@@ -306,11 +311,18 @@ fn add_substep(app: &mut App) {
             integrate.in_set(TawSystems::Integrate),
             generate_contacts.in_set(TawSystems::GenerateContacts),
             // What a game takes out of the contacts before they are restituted is not told.
-            (touches::collect.run_if(touches::are_read), restitute)
+            (
+                touches::collect.run_if(touches::are_read),
+                contact_points::collect.run_if(contact_points::are_read),
+                restitute,
+            )
                 .chain()
                 .in_set(TawSystems::Restitute),
             touches::collect_impacts.run_if(touches::are_read).after(TawSystems::Restitute),
             contact_force::collect.run_if(contact_force::are_read).after(TawSystems::Restitute),
+            contact_points::collect_solved
+                .run_if(contact_points::are_read)
+                .after(TawSystems::Restitute),
         ),
     );
     app.edit_schedule(Substep, one_by_one);

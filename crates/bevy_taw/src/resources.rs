@@ -8,7 +8,8 @@ use taw::world::{Marble, MarbleId, Model, SensorId, WallId};
 
 use crate::ball_sensor::SensedBall;
 use crate::contact_force::PairImpulse;
-use crate::messages::ContactPair;
+use crate::contact_points::ContactKey;
+use crate::messages::{ContactPair, ContactPoint};
 use crate::reflect::ModelReflect;
 
 /// Simulation settings: by default [`Model::GAME`].
@@ -93,6 +94,8 @@ pub struct TawWorld {
     pub(crate) stale_sensors: Vec<Entity>,
     /// Impulses of the contacts of the last step, sorted, one to a pair.
     pub(crate) pair_impulses: Vec<(ContactPair, PairImpulse)>,
+    /// Single contacts of the last step, sorted; none while nobody reads them.
+    pub(crate) contact_points: Vec<(ContactKey, ContactPoint)>,
     /// Marbles whose entities are disabled, as they were when they left.
     pub(crate) away: HashMap<Entity, Marble<f32>>,
     /// Number of restores, and true if there was one since the last gather.
