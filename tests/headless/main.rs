@@ -20,6 +20,7 @@ mod mesh_walls;
 mod motion;
 mod moving_walls;
 mod nasty;
+mod pair_filters;
 mod panels;
 mod picking;
 mod previews;

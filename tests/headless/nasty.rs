@@ -322,6 +322,7 @@ fn every_public_component_and_resource_has_a_row() {
         "CollidingBalls",
         "CollidingEntities",
         "CollisionLayers",
+        "FilterPairs",
         "IgnoreCollisions",
         "Kinematic",
         "MarbleIntegrator",

@@ -49,6 +49,7 @@
 //! | [`snapshot`] | back in time, and rows without entities |
 //! | [`preview`] | paths that marbles would take, and shots |
 //! | [`ignore`] | marbles that pass through others, one-way walls |
+//! | [`pair_filter`] | a system of the game that decides which pairs collide |
 //! | [`ignored`] | components that the model does not read |
 //! | [`refusal`] | input that was refused, marbles that had to be stopped |
 //! | [`diagnostics`] | step time and counts |
@@ -128,6 +129,7 @@ pub mod mesh_walls;
 pub mod messages;
 #[cfg(feature = "render")]
 mod outline;
+pub mod pair_filter;
 #[cfg(feature = "picking")]
 pub mod picking;
 mod plugin;
@@ -176,6 +178,7 @@ pub mod prelude {
     pub use crate::messages::{
         ContactEnded, ContactHit, ContactOngoing, ContactPair, ContactPoint, ContactStarted,
     };
+    pub use crate::pair_filter::{CandidatePairs, FilterPairs, PairFilter};
     #[cfg(feature = "picking")]
     pub use crate::picking::TawPickingPlugin;
     pub use crate::preview::Preview;

@@ -17,6 +17,7 @@ use crate::ignore::{self, ColliderDisabled, IgnoreCollisions, OneWay};
 use crate::ignored::{self, IgnoredComponents};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::layers::CollisionLayers;
+use crate::pair_filter::{self, FilterPairs, FilteredPairs};
 use crate::refusal::{self, InputRefused, MarbleStopped, Refusals, Told, report};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::schedule::{SchedulePlugin, TawSchedule};
@@ -147,6 +148,7 @@ impl Plugin for TawPlugin {
             .init_resource::<SpatialTree>()
             .init_resource::<ZoneGravity>()
             .init_resource::<IgnoredComponents>()
+            .init_resource::<FilteredPairs>()
             .init_resource::<gather_walls::FrameTime>()
             .add_message::<InputRefused>()
             .add_message::<RowRemoved>()
@@ -156,7 +158,7 @@ impl Plugin for TawPlugin {
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
             .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
             .register_type::<(Grounded, ContactForce, MarbleController, GravityZone, WindZone)>()
-            .register_type::<(IgnoreCollisions, ColliderDisabled, OneWay)>()
+            .register_type::<(IgnoreCollisions, ColliderDisabled, OneWay, FilterPairs)>()
             .register_type::<(TawModel, Gravity, SubstepDelta, SurfaceVelocity, Swarm)>();
         diagnostics::register(app);
         sensor::register(app);
@@ -254,6 +256,9 @@ fn add_gather(app: &mut App) {
             gather_walls::walls,
             ignore::count_down.run_if(any_with_component::<ColliderDisabled>),
             gather::marbles,
+            (pair_filter::list, pair_filter::ask, pair_filter::report)
+                .chain()
+                .run_if(pair_filter::any),
             ignore::gather.run_if(ignore::any),
             gather::forces,
             zones::act,

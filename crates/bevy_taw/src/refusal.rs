@@ -42,6 +42,11 @@ pub enum Refusal {
     /// A place or rotation that is not finite, as below an ancestor of scale zero.
     #[error("the place in the world is not finite: the scale along it is {0}, {1}, {2}")]
     NoFrame(f32, f32, f32),
+    /// A [`PairFilter`](crate::pair_filter::PairFilter) whose system does not run: the pairs collide.
+    #[error(
+        "the system of PairFilter, {0}, cannot be run: it is not registered, or lacks a parameter"
+    )]
+    PairFilter(Entity),
 }
 
 /// Refusals of this step and of the one before.
