@@ -37,7 +37,8 @@ use crate::wall::Wall;
 ///
 /// Each is also logged as a warning, once until it has an effect. Updated in each step, in
 /// [`TawSystems::Gather`](crate::TawSystems::Gather).
-#[derive(Resource, Clone, Debug, Default, PartialEq, Eq, Deref)]
+#[derive(Resource, Clone, Debug, Default, PartialEq, Eq, Deref, Reflect)]
+#[reflect(Resource, Debug, Default, PartialEq)]
 pub struct IgnoredComponents(Vec<&'static str>);
 
 /// Tables of the components that entities have, except those that default filters hide.

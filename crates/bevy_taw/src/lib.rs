@@ -195,7 +195,7 @@ pub mod prelude {
     pub use taw::motion::{ForceField, Integrator, Medium, Rotation};
     pub use taw::response::{Combine, ContactLaw, Response};
     pub use taw::swarm::{SwarmModel, Tier};
-    pub use taw::world::{Detection, Model, Precision};
+    pub use taw::world::{Detection, Model, Precision, StopReason};
 }
 
 /// Compiles what the README shows.

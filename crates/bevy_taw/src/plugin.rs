@@ -159,7 +159,8 @@ impl Plugin for TawPlugin {
             .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
             .register_type::<(Grounded, ContactForce, MarbleController, GravityZone, WindZone)>()
             .register_type::<(IgnoreCollisions, ColliderDisabled, OneWay, FilterPairs)>()
-            .register_type::<(TawModel, Gravity, SubstepDelta, SurfaceVelocity, Swarm)>();
+            .register_type::<(TawModel, TawSwarmModel, Gravity, Forces, IgnoredComponents)>()
+            .register_type::<(SubstepDelta, SurfaceVelocity, Swarm)>();
         diagnostics::register(app);
         sensor::register(app);
         observe(app);

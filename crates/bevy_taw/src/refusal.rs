@@ -5,7 +5,9 @@ use std::collections::HashSet;
 use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 use taw::response::Response;
+use taw::world::StopReason;
 
+use crate::reflect::StopReasonReflect;
 use crate::resources::TawWorld;
 
 /// A value that cannot be right was not taken over; what was there before stays.
@@ -101,20 +103,22 @@ impl Refusals<'_> {
 pub struct MarbleStopped {
     /// Which.
     pub entity: Entity,
+    /// Why.
+    #[reflect(remote = StopReasonReflect)]
+    pub reason: StopReason,
 }
 
 /// Reports the marbles that were stopped in this step.
 pub(crate) fn report_stopped(world: Res<TawWorld>, mut stopped: MessageWriter<MarbleStopped>) {
     for id in world.stopped() {
-        if let Some(&entity) = world.marble_entities.get(&id) {
-            let cause = match world.model().response {
-                Response::EventDriven => {
-                    "its motion overflowed, or had more events than a step may"
-                }
-                _ => "its motion is no longer finite",
+        let (entity, reason) = (world.marble_entities.get(&id), world.stop_reason(id));
+        if let (Some(&entity), Some(reason)) = (entity, reason) {
+            let cause = match reason {
+                StopReason::EventBudget => "it had more events than a step may have",
+                StopReason::NotFinite => "its motion is no longer finite",
             };
             log::warn!("taw stopped {entity}: {cause}");
-            stopped.write(MarbleStopped { entity });
+            stopped.write(MarbleStopped { entity, reason });
         }
     }
 }

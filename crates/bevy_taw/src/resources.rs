@@ -61,7 +61,12 @@ impl Default for Gravity {
 /// let planet = ForceField::attraction(Vec3::NEG_Y * 50.0, 2.5e4);
 /// app.insert_resource(Forces(vec![ForceField::Drag(wind), planet]));
 /// ```
-#[derive(Resource, Clone, Debug, Default, PartialEq, Deref, DerefMut)]
+///
+/// Reflection sees it as one opaque value, since functions are among the fields: it is copied and compared as a
+/// whole.
+#[derive(Resource, Clone, Debug, Default, PartialEq, Deref, DerefMut, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone, Debug, Default, PartialEq)]
 pub struct Forces(pub Vec<ForceField<f32>>);
 
 /// The physics of this app: a [`taw::world::World`], and which of its rows are
