@@ -2,6 +2,7 @@
 //! a clock that the test turns.
 
 mod balls;
+mod blender;
 mod board;
 mod capsules;
 mod contact_forces;
