@@ -30,6 +30,7 @@ mod reflection;
 mod scene;
 mod schedules;
 mod sensors;
+mod several_worlds;
 mod snapshots;
 mod soft_step;
 mod spawning;
