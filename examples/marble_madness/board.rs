@@ -196,11 +196,11 @@ pub fn spawn_board(
     let floor = Cuboid::new(outer, FLOOR_DEPTH, outer);
     commands.spawn((
         ChildOf(board),
-        Piece::HalfSpace(Dir3::Y),
+        (Piece::HalfSpace(Dir3::Y), Name::new("floor")),
         Transform::default(),
         Visibility::default(),
         children![(
-            Piece::Box(floor),
+            (Piece::Box(floor), Name::new("floor")),
             Mesh3d(meshes.add(floor)),
             MeshMaterial3d(floor_look),
             Transform::from_xyz(0.0, -FLOOR_DEPTH / 2.0, 0.0),
@@ -213,11 +213,11 @@ pub fn spawn_board(
         let turn = Quat::from_rotation_y(f32::from(quarter) * TAU / 4.0);
         commands.spawn((
             ChildOf(board),
-            Piece::HalfSpace(Dir3::Z),
+            (Piece::HalfSpace(Dir3::Z), Name::new("rail")),
             Transform::from_translation(turn * Vec3::NEG_Z * half).with_rotation(turn),
             Visibility::default(),
             children![(
-                Piece::Box(cuboid),
+                (Piece::Box(cuboid), Name::new("rail")),
                 Mesh3d(rail.clone()),
                 MeshMaterial3d(rail_look.clone()),
                 Transform::from_xyz(0.0, RAIL_HEIGHT / 2.0, -RAIL_WIDTH / 2.0),

@@ -19,6 +19,8 @@ pub enum Action {
     Orbit,
     DropMore,
     Flick,
+    /// Shows what is under the mouse.
+    Inspect,
     Reset,
     Pause,
     SingleStep,
@@ -28,12 +30,13 @@ pub enum Action {
 }
 
 /// All keys, as the help panel lists them.
-pub const HELP: [(&str, &str); 10] = [
+pub const HELP: [(&str, &str); 11] = [
     ("Arrows, WASD, left drag, left stick", "tilt the board"),
     ("Right drag, right stick", "turn the view"),
     ("Middle drag · wheel", "move the view · zoom"),
     ("Space · A", "drop ten more marbles"),
     ("F", "flick the marble under the mouse"),
+    ("I", "inspect the marble or wall under the mouse"),
     ("R · Select", "start over"),
     ("P · Start", "pause"),
     ("N", "one step while paused"),
@@ -52,6 +55,7 @@ fn bindings() -> InputMap<Action> {
         .with(Action::DropMore, KeyCode::Space)
         .with(Action::DropMore, GamepadButton::South)
         .with(Action::Flick, KeyCode::KeyF)
+        .with(Action::Inspect, KeyCode::KeyI)
         .with(Action::Reset, KeyCode::KeyR)
         .with(Action::Reset, GamepadButton::Select)
         .with(Action::Pause, KeyCode::KeyP)

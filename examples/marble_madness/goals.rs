@@ -9,6 +9,9 @@ use crate::marbles::{COLOURS, Colour, Order};
 /// The radius of a pad, in metres.
 const PAD_RADIUS: f32 = 1.5;
 
+/// Names of the pads, by colour.
+const PAD_NAMES: [&str; COLOURS.len()] = ["red pad", "yellow pad", "green pad", "blue pad"];
+
 /// Score and progress of the game.
 #[derive(Resource, Default)]
 pub struct Score {
@@ -51,8 +54,8 @@ fn spawn_pads(
         };
         commands.spawn((
             ChildOf(*board),
-            Pad,
-            Colour(index),
+            (Pad, Colour(index), Name::new(PAD_NAMES[index])),
+            (Wall::from(Sphere::new(PAD_RADIUS)), Sensor), // who is there, for the inspector
             Mesh3d(mesh.clone()),
             MeshMaterial3d(materials.add(look(0.0))),
             Transform::from_xyz(x, 0.0, z),

@@ -11,6 +11,7 @@ mod board;
 mod controls;
 mod flick;
 mod goals;
+mod inspect;
 mod level;
 mod marbles;
 mod panel;
@@ -52,6 +53,9 @@ struct Options {
     /// Open the panel that shows what each model costs and buys, and measure after a second
     #[arg(long)]
     trade: bool,
+    /// Open the window that shows a marble, the sensors and the layers
+    #[arg(long)]
+    inspect: bool,
     /// Play a scene in RON: one of assets/levels by its name (maze, mill), or a file
     #[arg(long, value_name = "FILE")]
     level: Option<PathBuf>,
@@ -74,6 +78,7 @@ fn main() -> AppExit {
             controls::plugin,
             flick::plugin,
             goals::plugin,
+            inspect::plugin,
             level::plugin,
             marbles::plugin,
             panel::plugin,

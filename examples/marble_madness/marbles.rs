@@ -40,6 +40,9 @@ pub struct Colour(pub usize);
 pub const COLOURS: [Srgba; 4] =
     [tailwind::RED_500, tailwind::YELLOW_400, tailwind::GREEN_500, tailwind::BLUE_500];
 
+/// Names of the marbles of each colour.
+const NAMES: [&str; COLOURS.len()] = ["red marble", "yellow marble", "green marble", "blue marble"];
+
 #[derive(Resource)]
 struct Look {
     ball: Handle<Mesh>,
@@ -237,7 +240,7 @@ fn colored(
     (
         Marble::new(radius),
         Velocity(velocity),
-        Colour(colour),
+        (Colour(colour), Name::new(NAMES[colour])),
         Mesh3d(look.ball.clone()),
         MeshMaterial3d(look.materials[colour].clone()),
         place.with_rotation(turn).with_scale(Vec3::splat(radius)),

@@ -14,6 +14,7 @@ use crate::Options;
 use crate::board::{MadeOfBoxes, Tilt};
 use crate::controls::{Action, HELP, just_pressed};
 use crate::goals::Score;
+use crate::inspect::Inspector;
 use crate::marbles::{Bag, Order};
 use crate::time::SingleStep;
 
@@ -70,7 +71,7 @@ fn measure(mut trade: ResMut<TawTrade>, mut world: ResMut<TawWorld>, fixed: Res<
 #[expect(clippy::too_many_arguments, reason = "a Bevy system")]
 fn panels(
     mut contexts: EguiContexts,
-    mut open: ResMut<Open>,
+    (mut open, mut inspector): (ResMut<Open>, ResMut<Inspector>),
     mut bag: ResMut<Bag>,
     mut tilt: ResMut<Tilt>,
     mut score: ResMut<Score>,
@@ -107,6 +108,7 @@ fn panels(
             }
         });
         ui.toggle_value(&mut open.trade, "What each model costs and buys…");
+        ui.toggle_value(&mut inspector.is_open, "A marble, sensors, layers…");
         section(ui, "Step", true, |ui| {
             debug_ui::counts(ui, &diagnostics);
             debug_ui::step_time(ui, &diagnostics);

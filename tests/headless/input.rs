@@ -93,12 +93,28 @@ fn an_overflowing_marble_is_stopped_told_and_alone() {
     for _ in 0..64 {
         app.update();
         let messages = app.world().resource::<Messages<MarbleStopped>>();
-        stopped.extend(messages.iter_current_update_messages().map(|m| m.entity));
+        stopped.extend(messages.iter_current_update_messages().copied());
     }
-    assert_eq!(stopped, [sick]);
+    assert_eq!(stopped, [MarbleStopped { entity: sick, reason: StopReason::NotFinite }]);
     assert_eq!(**app.world().get::<Velocity>(sick).unwrap(), Vec3::ZERO);
     let world = app.world().resource::<TawWorld>();
     assert_eq!(world.marbles.position()[0].x, 1.0, "the other one went on for a second");
+}
+
+/// In a periodic box, each cell that a marble crosses is an event: there are too many at 1e8 m/s.
+#[test]
+fn a_marble_with_too_many_events_is_told_to_have_them() {
+    let mut app = scene::app();
+    app.insert_resource(TawModel(Model::EXACT)).insert_resource(Gravity(Vec3::ZERO));
+    let box_of = [Some(8.0), None, Some(8.0)];
+    app.world_mut().resource_mut::<TawWorld>().set_period(box_of).unwrap();
+    let at = Transform::from_xyz(0.0, 1.0, 0.0);
+    let sped = Velocity(Vec3::new(1e8, 0.0, 3e7));
+    let marble = app.world_mut().spawn((Marble::new(0.2), at, sped)).id();
+    app.update();
+    let messages = app.world().resource::<Messages<MarbleStopped>>();
+    let stopped: Vec<_> = messages.iter_current_update_messages().copied().collect();
+    assert_eq!(stopped, [MarbleStopped { entity: marble, reason: StopReason::EventBudget }]);
 }
 
 #[test]
@@ -116,10 +132,18 @@ fn settings_and_components_are_open_to_reflection() {
         "bevy_taw::components::SurfaceMaterial",
         "bevy_taw::components::MarbleIntegrator",
         "bevy_taw::resources::TawModel",
+        "bevy_taw::swarm::TawSwarmModel",
+        "bevy_taw::resources::Forces",
+        "bevy_taw::ignored::IgnoredComponents",
         "bevy_taw::resources::Gravity",
     ] {
         assert!(registry.get_with_type_path(name).is_some(), "{name} is not registered");
     }
+    let mut swarms = app.world_mut().resource_mut::<TawSwarmModel>();
+    *swarms.path_mut::<f32>(".0.material.elasticity.poissons_ratio").unwrap() = 0.5;
+    assert_eq!(swarms.material.elasticity.poissons_ratio, 0.5);
+    let fields = Forces(vec![ForceField::attraction(Vec3::ZERO, 1.0)]);
+    assert_eq!(fields.reflect_partial_eq(&*fields.to_dynamic()), Some(true));
     // An inspector changes the model by path; the next step uses it.
     let mut model = app.world_mut().resource_mut::<TawModel>();
     *model.path_mut::<u32>(".0.substeps").unwrap() = 7;

@@ -2,9 +2,11 @@
 //! a clock that the test turns.
 
 mod balls;
+mod blender;
 mod board;
 mod capsules;
 mod contact_forces;
+mod contact_points;
 mod contacts;
 mod disabling;
 mod first_contact;
@@ -19,6 +21,7 @@ mod mesh_walls;
 mod motion;
 mod moving_walls;
 mod nasty;
+mod pair_filters;
 mod panels;
 mod picking;
 mod previews;
@@ -27,6 +30,7 @@ mod reflection;
 mod scene;
 mod schedules;
 mod sensors;
+mod several_worlds;
 mod snapshots;
 mod soft_step;
 mod spawning;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use bevy::prelude::*;
 use taw::math::Vec3 as TawVec3;
-use taw::prelude::{InnerSpace as _, Zero as _};
+use taw::prelude::Zero as _;
 use taw::response::Response;
 
 use crate::SubstepDelta;
@@ -12,7 +12,7 @@ use crate::components::MarbleState;
 use crate::convert::from_vector;
 use crate::messages::ContactPair;
 use crate::resources::TawWorld;
-use crate::touches;
+use crate::{contact_points, touches};
 
 /// Force that contacts exert on a wall or a marble, in N: add it to those of which you want to know it, a
 /// button or a scale. Updated after each step; what sleeps keeps its force.
@@ -51,8 +51,11 @@ pub struct ContactForce {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PairImpulse {
     pub impulse: Vec3,
-    /// Sum of the magnitudes of the normal impulses.
-    normal: f32,
+    /// Normal of the contact that bears most, to the second entity, if one bears something.
+    pub normal: Option<Vec3>,
+    /// Largest magnitude of a normal impulse, and the sum of all.
+    largest: f32,
+    sum: f32,
 }
 
 /// Impulses of the contacts of this step.
@@ -64,15 +67,15 @@ pub(crate) struct PairImpulses {
     impacts: usize,
 }
 
-/// Impulse of a pair in the last step, on its second entity.
-pub(crate) fn impulse_of(world: &TawWorld, pair: ContactPair) -> Vec3 {
+/// Impulse of a pair in the last step.
+pub(crate) fn impulse_of(world: &TawWorld, pair: ContactPair) -> PairImpulse {
     let found = world.pair_impulses.binary_search_by_key(&pair, |(pair, _)| *pair);
-    found.map_or(Vec3::ZERO, |at| world.pair_impulses[at].1.impulse)
+    found.map_or_else(|_| PairImpulse::default(), |at| world.pair_impulses[at].1)
 }
 
 /// Run condition: somebody reads impulses of contacts.
 pub(crate) fn are_read(world: &World, forces: Query<(), With<ContactForce>>) -> bool {
-    !forces.is_empty() || touches::are_read(world)
+    !forces.is_empty() || touches::are_read(world) || contact_points::are_read(world)
 }
 
 /// Lets the next step record impulses, if somebody reads them.
@@ -85,30 +88,41 @@ pub(crate) fn set_recording(In(are_read): In<bool>, mut world: ResMut<TawWorld>)
 /// Notes the impulses of a substep after it is solved.
 pub(crate) fn collect(world: Res<TawWorld>, mut impulses: ResMut<PairImpulses>) {
     let PairImpulses { now, impacts } = &mut *impulses;
-    let mut add = |on_wall: bool, rows: [u32; 2], impulse: TawVec3<f32>, normal: f32| {
+    let mut add = |on_wall: bool, rows: [u32; 2], impulse: TawVec3<f32>, normal: TawVec3<f32>| {
         let first = if on_wall { TawWorld::wall_entity } else { TawWorld::marble_entity };
         let (a, b) = (first(&world, rows[0]), world.marble_entity(rows[1]));
         let (Some(a), Some(b), true) = (a, b, impulse != TawVec3::zero()) else { return };
-        let (impulse, normal) = (from_vector(impulse), normal.abs());
         // Rows move about; the order of entities does not.
         let turned = !on_wall && b < a;
         let pair = if turned { ContactPair { a: b, b: a } } else { ContactPair { a, b } };
-        let impulse = if turned { -impulse } else { impulse };
-        now.push((pair, PairImpulse { impulse, normal }));
+        let sign = if turned { -1.0 } else { 1.0 };
+        let (impulse, normal) = (from_vector(impulse) * sign, from_vector(normal) * sign);
+        let size = impulse.dot(normal).abs();
+        now.push((pair, PairImpulse { impulse, normal: Some(normal), largest: size, sum: size }));
     };
     for c in &world.contacts.wm {
-        add(true, [c.a, c.b], c.impulse(), c.normal_impulse);
+        add(true, [c.a, c.b], c.impulse(), c.normal);
     }
     for c in &world.contacts.mm {
-        add(false, [c.a, c.b], c.impulse(), c.normal_impulse);
+        add(false, [c.a, c.b], c.impulse(), c.normal);
     }
     // Its contacts are those at the begin, and have no impulses; by the others, contacts have those of impacts.
     if world.model().response == Response::EventDriven {
         for it in world.impacts().iter().skip(*impacts) {
-            add(it.on_wall, [it.a, it.b], it.impulse, it.impulse.dot(it.normal));
+            add(it.on_wall, [it.a, it.b], it.impulse, it.normal);
         }
     }
     *impacts = world.impacts().len();
+}
+
+/// Returns true if both of a pair sleep, so that their contacts are not listed.
+pub(crate) fn sleeps(pair: ContactPair, world: &TawWorld, marbles: &Query<&MarbleState>) -> bool {
+    let sleeps = |entity: Entity| {
+        let id = marbles.get(entity).ok().map(|state| state.id);
+        // A wall does as if it slept.
+        id.is_none_or(|id| id.is_some_and(|id| world.is_asleep(id) == Ok(true)))
+    };
+    marbles.contains(pair.b) && sleeps(pair.b) && sleeps(pair.a)
 }
 
 /// Sums the impulses of a step by pairs. Contacts of what sleeps are not listed: they keep theirs.
@@ -120,22 +134,20 @@ pub(crate) fn finish(
     let mut list = std::mem::take(&mut world.pair_impulses);
     let PairImpulses { now, impacts } = &mut *impulses;
     *impacts = 0;
-    let sleeps = |entity: Entity| {
-        let id = marbles.get(entity).ok().map(|state| state.id);
-        // A wall does as if it slept.
-        id.is_none_or(|id| id.is_some_and(|id| world.is_asleep(id) == Ok(true)))
-    };
     now.sort_by_key(|(pair, _)| *pair);
     now.dedup_by(|(pair, impulse), (kept, sum)| {
         let same = pair == kept;
         if same {
+            if impulse.largest > sum.largest {
+                (sum.normal, sum.largest) = (impulse.normal, impulse.largest);
+            }
             sum.impulse += impulse.impulse;
-            sum.normal += impulse.normal;
+            sum.sum += impulse.sum;
         }
         same
     });
     // One that fell asleep within the step bore its contacts for a part of it only.
-    list.retain(|(pair, _)| marbles.contains(pair.b) && sleeps(pair.b) && sleeps(pair.a));
+    list.retain(|(pair, _)| sleeps(*pair, &world, &marbles));
     now.retain(|(pair, _)| list.binary_search_by_key(pair, |(pair, _)| *pair).is_err());
     list.append(now);
     list.sort_by_key(|(pair, _)| *pair);
@@ -159,12 +171,12 @@ pub(crate) fn write(
 ) {
     let per_second = 1.0 / step_of(&world, delta.0);
     let mut sums: BTreeMap<Entity, ContactForce> = BTreeMap::new();
-    for (ContactPair { a, b }, PairImpulse { impulse, normal }) in &world.pair_impulses {
+    for (ContactPair { a, b }, PairImpulse { impulse, sum: pressure, .. }) in &world.pair_impulses {
         for (entity, impulse) in [(*a, -*impulse), (*b, *impulse)] {
             if forces.contains(entity) {
                 let sum = sums.entry(entity).or_default();
                 sum.total += impulse * per_second;
-                sum.pressure += normal * per_second;
+                sum.pressure += pressure * per_second;
             }
         }
     }

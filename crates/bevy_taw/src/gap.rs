@@ -1,9 +1,10 @@
 //! Gaps between two that touched: which of them still do.
 
 use bevy::prelude::*;
-use taw::contact::touch_goes_on;
+use taw::contact::{closest_points, touch_goes_on};
 use taw::math::length;
-use taw::world::ColliderId;
+use taw::shape::{Capsule, Shape, Sphere};
+use taw::world::{ColliderId, MarbleId};
 
 use crate::components::{MarbleState, WallState};
 use crate::convert::from_vector;
@@ -38,16 +39,38 @@ pub(crate) fn gap(
 ) -> Option<Gap> {
     let id = marbles.get(pair.b).ok()?.id?;
     let collides = |other| world.may_collide(id, other) == Ok(true);
-    let b = world.marbles.get(id).ok()?;
+    let b = capsule(id, world)?;
     if let Ok(wall) = walls.get(pair.a) {
         let id = wall.id.filter(|id| collides(ColliderId::Wall(*id)))?;
         let wall = world.walls.get(id).ok()?;
-        Some(Gap { width: wall.project_point(b.position).distance - b.radius, radius: b.radius })
+        let width = |center| wall.project_point(center).distance - b.radius;
+        let width = if b.a == b.b {
+            width(b.a)
+        } else {
+            // Exact unless it lies on an edge, beside its middle.
+            width(b.a).min(width(b.b)).min(width(b.a + (b.b - b.a) * 0.5))
+        };
+        Some(Gap { width, radius: b.radius })
     } else {
         let id = marbles.get(pair.a).ok()?.id;
         let id = id.filter(|id| collides(ColliderId::Marble(*id)))?;
-        let a = world.marbles.get(id).ok()?;
-        let width = length(b.position - a.position) - a.radius - b.radius;
+        let a = capsule(id, world)?;
+        // To where it is nearest across the sides of a periodic box.
+        let across = world.nearest_image(b.a, a.a) - b.a;
+        let width = if a.a == a.b && b.a == b.b {
+            length(b.a + across - a.a) - a.radius - b.radius
+        } else {
+            closest_points(&a, &Capsule { a: b.a + across, b: b.b + across, ..b }).distance
+        };
         Some(Gap { width, radius: a.radius.min(b.radius) })
+    }
+}
+
+/// Capsule that a marble is; of a ball, both ends are its center.
+fn capsule(id: MarbleId, world: &TawWorld) -> Option<Capsule<f32>> {
+    match world.marbles.shape(id).ok()? {
+        Shape::Capsule(capsule) => Some(capsule),
+        Shape::Sphere(Sphere { center, radius }) => Some(Capsule { a: center, b: center, radius }),
+        _ => None, // marbles are no others
     }
 }

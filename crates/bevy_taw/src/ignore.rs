@@ -1,11 +1,14 @@
 //! Marbles that pass through others: through those that they name, through all for a time, and through
 //! one-way walls.
 
+use std::collections::BTreeMap;
+
 use bevy::prelude::*;
-use taw::world::ColliderId;
+use taw::world::{ColliderId, MarbleId};
 
 use crate::components::{MarbleState, WallState};
 use crate::convert::at_least_zero;
+use crate::pair_filter::FilteredPairs;
 use crate::refusal::Refusals;
 use crate::resources::TawWorld;
 
@@ -107,36 +110,42 @@ pub(crate) fn count_down(
     }
 }
 
-/// Run condition: a marble names others, or did.
-pub(crate) fn any(world: Res<TawWorld>, marbles: Query<(), With<IgnoreCollisions>>) -> bool {
-    world.marbles.ignoring().next().is_some() || !marbles.is_empty()
+/// Run condition: a marble names others, or did, or the game's filter lets some pass.
+pub(crate) fn any(
+    world: Res<TawWorld>,
+    filtered: Res<FilteredPairs>,
+    marbles: Query<(), With<IgnoreCollisions>>,
+) -> bool {
+    world.marbles.ignoring().next().is_some() || !filtered.pass().is_empty() || !marbles.is_empty()
 }
 
-/// Takes over whom marbles pass through.
+/// Takes over whom marbles pass through: those whom they name, and by the game's filter.
 pub(crate) fn gather(
     mut world: ResMut<TawWorld>,
-    marbles: Query<(&MarbleState, &IgnoreCollisions)>,
+    filtered: Res<FilteredPairs>,
+    marbles: Query<(Entity, &IgnoreCollisions), With<MarbleState>>,
     colliders: Query<(Option<&MarbleState>, Option<&WallState>)>,
 ) {
-    let collider = |entity: &Entity| match colliders.get(*entity).ok()? {
+    let collider = |entity: Entity| match colliders.get(entity).ok()? {
         (Some(MarbleState { id: Some(id), .. }), _) => Some(ColliderId::Marble(*id)),
         (_, Some(WallState { id: Some(id), .. })) => Some(ColliderId::Wall(*id)),
         _ => None,
     };
-    for (state, IgnoreCollisions(others)) in &marbles {
-        let Some(id) = state.id else { continue };
-        let others: Vec<_> = others.iter().filter_map(collider).collect();
+    let named = marbles.iter().flat_map(|(marble, IgnoreCollisions(others))| {
+        others.iter().map(move |other| (marble, *other))
+    });
+    let filtered = filtered.pass().iter().map(|pair| (pair.b, pair.a));
+    let mut ignored: BTreeMap<MarbleId, Vec<ColliderId>> = BTreeMap::new();
+    for (marble, other) in named.chain(filtered) {
+        if let (Some(ColliderId::Marble(id)), Some(other)) = (collider(marble), collider(other)) {
+            ignored.entry(id).or_default().push(other);
+        }
+    }
+    let over = world.marbles.ignoring().filter(|id| !ignored.contains_key(id));
+    let over: Vec<_> = over.map(|id| (id, Vec::new())).collect();
+    for (id, others) in over.into_iter().chain(ignored) {
         if world.marbles.ignored(id).is_ok_and(|before| before != others) {
             let _ = world.marbles.set_ignored(id, &others); // it is there
         }
-    }
-    let names_some = |id| {
-        let (state, _) = marbles.get(*world.marble_entities.get(&id)?).ok()?;
-        (state.id == Some(id)).then_some(())
-    };
-    let ignoring = world.marbles.ignoring();
-    let over: Vec<_> = ignoring.filter(|id| names_some(*id).is_none()).collect();
-    for id in over {
-        let _ = world.marbles.set_ignored(id, &[]); // it is there
     }
 }

@@ -17,6 +17,7 @@ use crate::contact_force::ContactForce;
 use crate::controller::MarbleController;
 use crate::grounded::Grounded;
 use crate::ignore::{ColliderDisabled, IgnoreCollisions, OneWay};
+use crate::pair_filter::{FilterPairs, PairFilter};
 use crate::resources::TawWorld;
 use crate::sensor::Sensor;
 use crate::wall::Wall;
@@ -30,12 +31,14 @@ use crate::wall::Wall;
 /// - `integrator`, `precision` and `detection` of the model where its response does not read them; an
 ///   integrator by `SoftStep` where no [`Forces`](crate::resources::Forces) act. (Its
 ///   `iterations` are not named: every model has some.)
+/// - a [`FilterPairs`] in an app without a [`PairFilter`];
 /// - components of marbles on walls, as a `Velocity`, those of walls on marbles, as a `OneWay`, and a
 ///   `Sensor` or a zone without a [`Wall`].
 ///
 /// Each is also logged as a warning, once until it has an effect. Updated in each step, in
 /// [`TawSystems::Gather`](crate::TawSystems::Gather).
-#[derive(Resource, Clone, Debug, Default, PartialEq, Eq, Deref)]
+#[derive(Resource, Clone, Debug, Default, PartialEq, Eq, Deref, Reflect)]
+#[reflect(Resource, Debug, Default, PartialEq)]
 pub struct IgnoredComponents(Vec<&'static str>);
 
 /// Tables of the components that entities have, except those that default filters hide.
@@ -115,9 +118,11 @@ impl<'a> Carriers<'a> {
     }
 
     /// Each name of a component that has no effect where it is, and true if an entity has it there.
-    fn of_places(&self) -> [(&'static str, bool); 19] {
+    fn of_places(&self, has_filter: bool) -> [(&'static str, bool); 20] {
         let (marbles, walls) = (&self.marbles, &self.walls);
+        let is_marked = self.any::<FilterPairs>(marbles) || self.any::<FilterPairs>(walls);
         [
+            ("FilterPairs without a PairFilter", is_marked && !has_filter),
             ("Velocity of a wall", self.any::<Velocity>(walls)),
             ("AngularVelocity of a wall", self.any::<AngularVelocity>(walls)),
             ("MarbleMass of a wall", self.any::<MarbleMass>(walls)),
@@ -158,6 +163,7 @@ pub(crate) fn find(
     archetypes: &Archetypes,
     components: &Components,
     hidden: Res<DefaultQueryFilters>,
+    filter: Option<Res<PairFilter>>,
     mut found: ResMut<IgnoredComponents>,
 ) {
     let model = world.model();
@@ -174,7 +180,7 @@ pub(crate) fn find(
             if *name == "MarbleMass" { " in contacts" } else { "" }
         );
     }
-    let misplaced = without_effect(&carriers.of_places());
+    let misplaced = without_effect(&carriers.of_places(filter.is_some()));
     for name in misplaced.iter().filter(|name| !found.contains(name)) {
         log::warn!("without effect: {name}");
     }

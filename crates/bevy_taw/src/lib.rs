@@ -49,6 +49,7 @@
 //! | [`snapshot`] | back in time, and rows without entities |
 //! | [`preview`] | paths that marbles would take, and shots |
 //! | [`ignore`] | marbles that pass through others, one-way walls |
+//! | [`pair_filter`] | a system of the game that decides which pairs collide |
 //! | [`ignored`] | components that the model does not read |
 //! | [`refusal`] | input that was refused, marbles that had to be stopped |
 //! | [`diagnostics`] | step time and counts |
@@ -89,13 +90,71 @@
 //! A longer frame makes as many steps as fit in; of one of more than 250 ms, Bevy passes over the rest
 //! ([`Time::<Virtual>::max_delta`](bevy::time::Time::max_delta)).
 //!
+//! # Several worlds
+//! Another world, of its own gravity and model, as for a split screen or a game within the game, is a Bevy
+//! [`World`] with the plugin. The app keeps it as a resource and steps it; its marbles and walls are entities
+//! there, of which entities of the app show the places. Messages, [`SpatialQuery`] and snapshots are those
+//! of their world.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy::time::TimeUpdateStrategy;
+//! use bevy_taw::prelude::*;
+//!
+//! #[derive(Resource)]
+//! struct Moon(World);
+//!
+//! /// Entity on the moon that is drawn at the place of this one.
+//! #[derive(Component)]
+//! struct Shows(Entity);
+//!
+//! fn moon(app: &App) -> Moon {
+//!     let mut moon = App::new();
+//!     moon.add_plugins((MinimalPlugins, TransformPlugin, TawPlugin));
+//!     let step = app.world().resource::<Time<Fixed>>().timestep();
+//!     moon.insert_resource(Time::<Fixed>::from_duration(step))
+//!         .insert_resource(TimeUpdateStrategy::ManualDuration(step)) // a frame is a step
+//!         .insert_resource(Gravity(Vec3::NEG_Y * 1.62));
+//!     moon.finish();
+//!     moon.cleanup();
+//!     moon.update(); // Bevy's first frame takes no time
+//!     Moon(std::mem::take(moon.world_mut()))
+//! }
+//!
+//! /// Exclusive, since one schedule does not run in a thread of another.
+//! fn step(app: &mut World) {
+//!     let moon = &mut app.resource_mut::<Moon>().into_inner().0;
+//!     moon.run_schedule(Main);
+//!     moon.clear_trackers();
+//! }
+//!
+//! fn show(moon: Res<Moon>, mut shown: Query<(&Shows, &mut Transform)>) {
+//!     for (Shows(entity), mut drawn) in &mut shown {
+//!         if let Some(place) = moon.0.get::<Transform>(*entity) {
+//!             *drawn = *place;
+//!         }
+//!     }
+//! }
+//!
+//! # let mut app = App::new();
+//! # app.add_plugins((MinimalPlugins, TransformPlugin));
+//! app.add_plugins(TawPlugin);
+//! let mut moon = moon(&app);
+//! let rock = moon.0.spawn(Marble::new(0.5)).id();
+//! app.world_mut().spawn((Shows(rock), Transform::default()));
+//! app.insert_resource(moon).add_systems(FixedUpdate, (step, show).chain());
+//! # app.update();
+//! ```
+//!
 //! # Units
 //! Metres, seconds. `Transform::scale` does not change a marble's radius.
 //!
 //! [`FixedUpdate`]: bevy::app::FixedUpdate
 //! [`Model::substeps`]: taw::world::Model::substeps
 //! [`TawSystems`]: crate::TawSystems
+//! [`SpatialQuery`]: crate::spatial_query::SpatialQuery
 //! [`Velocity`]: crate::components::Velocity
+//! [`World`]: bevy::ecs::world::World
 //! [`TawWorld`]: crate::resources::TawWorld
 
 #![cfg_attr(not(test), warn(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
@@ -104,6 +163,7 @@ mod ball;
 mod ball_sensor;
 pub mod components;
 pub mod contact_force;
+mod contact_points;
 pub mod controller;
 mod convert;
 #[cfg(feature = "debug_ui")]
@@ -127,6 +187,7 @@ pub mod mesh_walls;
 pub mod messages;
 #[cfg(feature = "render")]
 mod outline;
+pub mod pair_filter;
 #[cfg(feature = "picking")]
 pub mod picking;
 mod plugin;
@@ -173,8 +234,9 @@ pub mod prelude {
     #[cfg(feature = "mesh")]
     pub use crate::mesh_walls::{MeshShape, MeshWalls};
     pub use crate::messages::{
-        ContactEnded, ContactHit, ContactOngoing, ContactPair, ContactStarted,
+        ContactEnded, ContactHit, ContactOngoing, ContactPair, ContactPoint, ContactStarted,
     };
+    pub use crate::pair_filter::{CandidatePairs, FilterPairs, PairFilter};
     #[cfg(feature = "picking")]
     pub use crate::picking::TawPickingPlugin;
     pub use crate::preview::Preview;
@@ -191,7 +253,7 @@ pub mod prelude {
     pub use taw::motion::{ForceField, Integrator, Medium, Rotation};
     pub use taw::response::{Combine, ContactLaw, Response};
     pub use taw::swarm::{SwarmModel, Tier};
-    pub use taw::world::{Detection, Model, Precision};
+    pub use taw::world::{Detection, Model, Precision, StopReason};
 }
 
 /// Compiles what the README shows.

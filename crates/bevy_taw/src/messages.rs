@@ -1,8 +1,8 @@
 //! Contacts that start, go on and end, and hits, as messages and as events of the entities that touch.
 //!
 //! Messages are opt-in, as in Bevy: kinds that you register are sent. Observers need nothing else:
-//! [`ContactStarted`], [`ContactOngoing`], [`ContactEnded`] and [`ContactHit`] are triggered once for each
-//! of the two entities if somebody observes them, with that entity as `pair.a`. Contacts are collected only if at
+//! [`ContactStarted`], [`ContactOngoing`], [`ContactEnded`], [`ContactHit`] and [`ContactPoint`] are triggered once
+//! for each of the two entities if somebody observes them, with that entity as `pair.a`. Contacts are collected only if at
 //! least one kind is read or observed.
 //!
 //! ```
@@ -57,7 +57,7 @@ impl ContactPair {
 }
 
 /// Two that did not touch in the last step do in this one. For each pair once a
-/// step, however many substeps there are.
+/// step, however many substeps and contacts there are: it says one of them, and [`ContactPoint`] all.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct ContactStarted {
@@ -86,11 +86,11 @@ impl ContactStarted {
         self.pair.on(entity, self.impulse)
     }
 
-    /// Contact that goes on, of which nobody reads more than the pair.
-    pub(crate) fn going_on(pair: ContactPair) -> Self {
+    /// Contact that goes on, of which nobody reads more than the pair and the normal.
+    pub(crate) fn going_on(pair: ContactPair, normal: Vec3) -> Self {
         let zero = Vec3::ZERO;
         let (part, approach_speed, slip_speed) = (0, 0.0, 0.0);
-        Self { pair, normal: zero, point: zero, part, approach_speed, slip_speed, impulse: zero }
+        Self { pair, normal, point: zero, part, approach_speed, slip_speed, impulse: zero }
     }
 }
 
@@ -176,6 +176,8 @@ impl ContactHit {
 pub struct ContactOngoing {
     /// The two entities.
     pub pair: ContactPair,
+    /// Unit normal from `a` to `b`, of the contact that bears most.
+    pub normal: Vec3,
     /// Mean force of all contacts of the pair in the step, on `b`, in N; what sleeps keeps it. See
     /// [`ContactForce`](crate::prelude::ContactForce) for when it is known.
     pub force: Vec3,
@@ -187,6 +189,74 @@ impl ContactOngoing {
     #[must_use]
     pub fn force_on(&self, entity: Entity) -> Vec3 {
         self.pair.on(entity, self.force)
+    }
+}
+
+/// One contact of two that touch: a ball in the corner of a mesh has two with it, a capsule that lies on a
+/// floor too. Sent in each step for each contact, also of what sleeps. A contact is known by its pair, the part of
+/// the wall and the features of capsules that meet, so that what rolls from triangle to triangle of a mesh begins one after
+/// the other.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// # let mut app = App::new();
+/// /// Sparks where a capsule scrapes along, at both ends of it.
+/// fn scrape(mut contacts: MessageReader<ContactPoint>) {
+///     for contact in contacts.read().filter(|contact| contact.slip_speed > 1.0) {
+///         println!("{} N s of friction at {}", contact.tangent_impulse.length(), contact.point);
+///     }
+/// }
+/// app.add_message::<ContactPoint>().add_systems(FixedUpdate, scrape.after(TawSystems::Scatter));
+/// ```
+#[derive(Message, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Debug, PartialEq)]
+pub struct ContactPoint {
+    /// The two entities.
+    pub pair: ContactPair,
+    /// Unit normal from `a` to `b`.
+    pub normal: Vec3,
+    /// Contact point, in metres in world space.
+    pub point: Vec3,
+    /// Sub-shape of a wall: part of a compound, or triangle of a mesh.
+    pub part: u32,
+    /// True in the first step of the contact.
+    pub is_new: bool,
+    /// Largest approach speed along the normal in the step, before the contact is solved, in m/s; negative if the
+    /// two part. Zero for what sleeps, and for contacts that come about while others are solved.
+    pub approach_speed: f32,
+    /// Speed at which the surfaces slide over each other then, in m/s.
+    pub slip_speed: f32,
+    /// Normal impulse in the step, in N s; on `b` along the normal. What sleeps keeps it. See
+    /// [`ContactForce`](crate::prelude::ContactForce) for when impulses are known.
+    pub normal_impulse: f32,
+    /// Friction impulse in the step, on `b`, in N s.
+    pub tangent_impulse: Vec3,
+}
+
+impl ContactPoint {
+    /// Impulse on one of the two, in N s: along the normal and by friction on `b`, the opposite on `a`, and zero on
+    /// any other entity.
+    #[must_use]
+    pub fn impulse_on(&self, entity: Entity) -> Vec3 {
+        self.pair.on(entity, self.normal * self.normal_impulse + self.tangent_impulse)
+    }
+
+    /// Contact as two begin to touch, without impulses.
+    pub(crate) fn of(touch: ContactStarted) -> Self {
+        let ContactStarted { pair, normal, point, part, approach_speed, slip_speed, .. } = touch;
+        let (normal_impulse, tangent_impulse) = (0.0, Vec3::ZERO);
+        Self {
+            pair,
+            normal,
+            point,
+            part,
+            is_new: true,
+            approach_speed,
+            slip_speed,
+            normal_impulse,
+            tangent_impulse,
+        }
     }
 }
 
@@ -232,7 +302,14 @@ impl ContactEvent for ContactHit {
 
 impl ContactEvent for ContactOngoing {
     fn swapped(self) -> Self {
-        Self { pair: self.pair.swapped(), force: -self.force }
+        Self { pair: self.pair.swapped(), normal: -self.normal, force: -self.force }
+    }
+}
+
+impl ContactEvent for ContactPoint {
+    fn swapped(self) -> Self {
+        let (normal, tangent_impulse) = (-self.normal, -self.tangent_impulse);
+        Self { pair: self.pair.swapped(), normal, tangent_impulse, ..self }
     }
 }
 
@@ -255,4 +332,4 @@ macro_rules! entity_event {
         }
     )*};
 }
-entity_event!(ContactStarted, ContactHit, ContactOngoing, ContactEnded);
+entity_event!(ContactStarted, ContactHit, ContactOngoing, ContactPoint, ContactEnded);

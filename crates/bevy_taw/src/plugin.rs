@@ -9,6 +9,7 @@ use crate::components::{
     SurfaceMaterial, SurfaceVelocity, Teleport, Velocity,
 };
 use crate::contact_force::{ContactForce, PairImpulses};
+use crate::contact_points::{self, Points};
 use crate::controller::MarbleController;
 use crate::diagnostics::{self, StepTimes};
 use crate::grounded::Grounded;
@@ -16,6 +17,7 @@ use crate::ignore::{self, ColliderDisabled, IgnoreCollisions, OneWay};
 use crate::ignored::{self, IgnoredComponents};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::layers::CollisionLayers;
+use crate::pair_filter::{self, FilterPairs, FilteredPairs};
 use crate::refusal::{self, InputRefused, MarbleStopped, Refusals, Told, report};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::schedule::{SchedulePlugin, TawSchedule};
@@ -141,10 +143,12 @@ impl Plugin for TawPlugin {
             .init_resource::<gather::ChangedMarbles>()
             .init_resource::<Touches>()
             .init_resource::<PairImpulses>()
+            .init_resource::<Points>()
             .init_resource::<Told>()
             .init_resource::<SpatialTree>()
             .init_resource::<ZoneGravity>()
             .init_resource::<IgnoredComponents>()
+            .init_resource::<FilteredPairs>()
             .init_resource::<gather_walls::FrameTime>()
             .add_message::<InputRefused>()
             .add_message::<RowRemoved>()
@@ -154,8 +158,9 @@ impl Plugin for TawPlugin {
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
             .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
             .register_type::<(Grounded, ContactForce, MarbleController, GravityZone, WindZone)>()
-            .register_type::<(IgnoreCollisions, ColliderDisabled, OneWay)>()
-            .register_type::<(TawModel, Gravity, SubstepDelta, SurfaceVelocity, Swarm)>();
+            .register_type::<(IgnoreCollisions, ColliderDisabled, OneWay, FilterPairs)>()
+            .register_type::<(TawModel, TawSwarmModel, Gravity, Forces, IgnoredComponents)>()
+            .register_type::<(SubstepDelta, SurfaceVelocity, Swarm)>();
         diagnostics::register(app);
         sensor::register(app);
         observe(app);
@@ -252,6 +257,9 @@ fn add_gather(app: &mut App) {
             gather_walls::walls,
             ignore::count_down.run_if(any_with_component::<ColliderDisabled>),
             gather::marbles,
+            (pair_filter::list, pair_filter::ask, pair_filter::report)
+                .chain()
+                .run_if(pair_filter::any),
             ignore::gather.run_if(ignore::any),
             gather::forces,
             zones::act,
@@ -286,7 +294,10 @@ fn add_scatter(app: &mut App) {
             contact_force::write.run_if(any_with_component::<ContactForce>),
             touches::write.run_if(touches::are_read),
             touches::forget.run_if(not(touches::are_read)),
+            contact_points::write.run_if(contact_points::are_read),
+            contact_points::forget.run_if(not(contact_points::are_read)),
             diagnostics::measure,
+            contact_points::trigger.run_if(contact_points::are_observed),
             touches::trigger.run_if(touches::are_observed),
         )
             .chain(),
@@ -306,11 +317,18 @@ fn add_substep(app: &mut App) {
             integrate.in_set(TawSystems::Integrate),
             generate_contacts.in_set(TawSystems::GenerateContacts),
             // What a game takes out of the contacts before they are restituted is not told.
-            (touches::collect.run_if(touches::are_read), restitute)
+            (
+                touches::collect.run_if(touches::are_read),
+                contact_points::collect.run_if(contact_points::are_read),
+                restitute,
+            )
                 .chain()
                 .in_set(TawSystems::Restitute),
             touches::collect_impacts.run_if(touches::are_read).after(TawSystems::Restitute),
             contact_force::collect.run_if(contact_force::are_read).after(TawSystems::Restitute),
+            contact_points::collect_solved
+                .run_if(contact_points::are_read)
+                .after(TawSystems::Restitute),
         ),
     );
     app.edit_schedule(Substep, one_by_one);

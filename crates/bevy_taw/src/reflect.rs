@@ -77,6 +77,63 @@ pub enum PrecisionReflect {
     Compensated,
 }
 
+/// Mirrors [`taw::world::StopReason`].
+#[reflect_remote(taw::world::StopReason)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq)]
+pub enum StopReasonReflect {
+    NotFinite,
+    EventBudget,
+}
+
+/// Mirrors [`taw::swarm::Tier`].
+#[reflect_remote(taw::swarm::Tier)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq)]
+pub enum TierReflect {
+    Lab,
+    Full,
+}
+
+/// Mirrors [`taw::response::Elasticity`].
+#[reflect_remote(taw::response::Elasticity<f32>)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq)]
+pub struct ElasticityReflect {
+    pub youngs_modulus: f32,
+    pub poissons_ratio: f32,
+}
+
+/// Mirrors [`taw::response::Material`].
+#[reflect_remote(taw::response::Material<f32>)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq)]
+pub struct MaterialReflect {
+    pub restitution: f32,
+    pub friction: f32,
+    pub tangential_restitution: f32,
+    pub rolling_resistance: f32,
+    pub spinning_resistance: f32,
+    #[reflect(remote = ElasticityReflect)]
+    pub elasticity: taw::response::Elasticity<f32>,
+    #[reflect(remote = CombineReflect)]
+    pub combine: taw::response::Combine,
+}
+
+/// Mirrors [`taw::swarm::SwarmModel`].
+#[reflect_remote(taw::swarm::SwarmModel)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq)]
+pub struct SwarmModelReflect {
+    #[reflect(remote = TierReflect)]
+    pub tier: taw::swarm::Tier,
+    pub substeps: u32,
+    pub threads: u32,
+    #[reflect(remote = MaterialReflect)]
+    pub material: taw::response::Material<f32>,
+    pub sleeps: bool,
+}
+
 /// Mirrors [`taw::world::Model`].
 #[reflect_remote(taw::world::Model)]
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,9 @@ use std::collections::HashSet;
 use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 use taw::response::Response;
+use taw::world::StopReason;
 
+use crate::reflect::StopReasonReflect;
 use crate::resources::TawWorld;
 
 /// A value that cannot be right was not taken over; what was there before stays.
@@ -42,6 +44,11 @@ pub enum Refusal {
     /// A place or rotation that is not finite, as below an ancestor of scale zero.
     #[error("the place in the world is not finite: the scale along it is {0}, {1}, {2}")]
     NoFrame(f32, f32, f32),
+    /// A [`PairFilter`](crate::pair_filter::PairFilter) whose system does not run: the pairs collide.
+    #[error(
+        "the system of PairFilter, {0}, cannot be run: it is not registered, or lacks a parameter"
+    )]
+    PairFilter(Entity),
 }
 
 /// Refusals of this step and of the one before.
@@ -96,20 +103,22 @@ impl Refusals<'_> {
 pub struct MarbleStopped {
     /// Which.
     pub entity: Entity,
+    /// Why.
+    #[reflect(remote = StopReasonReflect)]
+    pub reason: StopReason,
 }
 
 /// Reports the marbles that were stopped in this step.
 pub(crate) fn report_stopped(world: Res<TawWorld>, mut stopped: MessageWriter<MarbleStopped>) {
     for id in world.stopped() {
-        if let Some(&entity) = world.marble_entities.get(&id) {
-            let cause = match world.model().response {
-                Response::EventDriven => {
-                    "its motion overflowed, or had more events than a step may"
-                }
-                _ => "its motion is no longer finite",
+        let (entity, reason) = (world.marble_entities.get(&id), world.stop_reason(id));
+        if let (Some(&entity), Some(reason)) = (entity, reason) {
+            let cause = match reason {
+                StopReason::EventBudget => "it had more events than a step may have",
+                StopReason::NotFinite => "its motion is no longer finite",
             };
             log::warn!("taw stopped {entity}: {cause}");
-            stopped.write(MarbleStopped { entity });
+            stopped.write(MarbleStopped { entity, reason });
         }
     }
 }

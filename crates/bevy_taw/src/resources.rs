@@ -8,7 +8,8 @@ use taw::world::{Marble, MarbleId, Model, SensorId, WallId};
 
 use crate::ball_sensor::SensedBall;
 use crate::contact_force::PairImpulse;
-use crate::messages::ContactPair;
+use crate::contact_points::ContactKey;
+use crate::messages::{ContactPair, ContactPoint};
 use crate::reflect::ModelReflect;
 
 /// Simulation settings: by default [`Model::GAME`].
@@ -60,7 +61,12 @@ impl Default for Gravity {
 /// let planet = ForceField::attraction(Vec3::NEG_Y * 50.0, 2.5e4);
 /// app.insert_resource(Forces(vec![ForceField::Drag(wind), planet]));
 /// ```
-#[derive(Resource, Clone, Debug, Default, PartialEq, Deref, DerefMut)]
+///
+/// Reflection sees it as one opaque value, since functions are among the fields: it is copied and compared as a
+/// whole.
+#[derive(Resource, Clone, Debug, Default, PartialEq, Deref, DerefMut, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone, Debug, Default, PartialEq)]
 pub struct Forces(pub Vec<ForceField<f32>>);
 
 /// The physics of this app: a [`taw::world::World`], and which of its rows are
@@ -93,6 +99,8 @@ pub struct TawWorld {
     pub(crate) stale_sensors: Vec<Entity>,
     /// Impulses of the contacts of the last step, sorted, one to a pair.
     pub(crate) pair_impulses: Vec<(ContactPair, PairImpulse)>,
+    /// Single contacts of the last step, sorted; none while nobody reads them.
+    pub(crate) contact_points: Vec<(ContactKey, ContactPoint)>,
     /// Marbles whose entities are disabled, as they were when they left.
     pub(crate) away: HashMap<Entity, Marble<f32>>,
     /// Number of restores, and true if there was one since the last gather.

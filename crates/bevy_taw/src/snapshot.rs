@@ -9,7 +9,8 @@ use taw::world::{MarbleId, SensorId, WallId};
 use crate::ball_sensor::SensedBall;
 use crate::components::{MarbleState, Sleeping, WallState};
 use crate::contact_force::PairImpulse;
-use crate::messages::ContactPair;
+use crate::contact_points::ContactKey;
+use crate::messages::{ContactPair, ContactPoint};
 use crate::resources::TawWorld;
 
 /// The physics of an app as it was: see [`TawWorld::snapshot`].
@@ -24,6 +25,7 @@ pub struct TawSnapshot {
     moving_walls: Vec<WallId>,
     sensed: HashMap<(SensorId, MarbleId), Entity>,
     pair_impulses: Vec<(ContactPair, PairImpulse)>,
+    contact_points: Vec<(ContactKey, ContactPoint)>,
 }
 
 /// A row of the world that no entity stood behind was taken out, as after a
@@ -53,6 +55,7 @@ impl TawWorld {
             moving_walls: self.moving_walls.clone(),
             sensed: self.sensed.clone(),
             pair_impulses: self.pair_impulses.clone(),
+            contact_points: self.contact_points.clone(),
         }
     }
 
@@ -92,6 +95,7 @@ impl TawWorld {
         self.moving_walls.clone_from(&snapshot.moving_walls);
         self.sensed.clone_from(&snapshot.sensed);
         self.pair_impulses.clone_from(&snapshot.pair_impulses);
+        self.contact_points.clone_from(&snapshot.contact_points);
         self.left_sensors.clear();
         self.stale_sensors.extend(self.sensor_entities.values());
         self.restored = self.restored.wrapping_add(1);

@@ -9,6 +9,7 @@ use taw::swarm::{Stage, SwarmModel};
 use crate::components::MarbleMass;
 use crate::diagnostics::StepTimes;
 use crate::layers::CollisionLayers;
+use crate::reflect::SwarmModelReflect;
 use crate::refusal::{Refusals, report};
 use crate::resources::TawWorld;
 use crate::snapshot::{RowRemoved, lost_balls};
@@ -70,8 +71,9 @@ pub enum Tint {
 
 /// Model of all swarms. May change at any time; what cannot be right is refused with an
 /// [`InputRefused`](crate::refusal::InputRefused), and the last good one stays.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut)]
-pub struct TawSwarmModel(pub SwarmModel);
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut, Reflect)]
+#[reflect(Resource, Debug, Default, PartialEq)]
+pub struct TawSwarmModel(#[reflect(remote = SwarmModelReflect)] pub SwarmModel);
 
 impl Swarm {
     /// These marbles.

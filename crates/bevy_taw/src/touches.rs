@@ -5,7 +5,7 @@ use bevy::ecs::observer::CachedObservers;
 use bevy::prelude::*;
 use taw::contact::Contact;
 use taw::math::{Vec3 as TawVec3, length};
-use taw::response::Response;
+use taw::response::{Impact, Response};
 
 use crate::SubstepDelta;
 use crate::components::{MarbleState, WallState};
@@ -28,8 +28,8 @@ const ONE_DIRECTION: f32 = 0.95;
 pub(crate) struct Touches {
     /// In the order found, several to a pair if there are substeps.
     now: Vec<ContactStarted>,
-    /// Sorted, one to a pair.
-    before: Vec<ContactPair>,
+    /// Pairs and the normals of their contacts, sorted, one to a pair.
+    before: Vec<(ContactPair, Vec3)>,
     /// Hits in the order found.
     hits: Vec<ContactHit>,
     /// Number of this step's impacts already noted.
@@ -92,7 +92,7 @@ pub(crate) fn trigger(world: &mut World) {
     world.resource_mut::<Touches>().events = events; // for their memory
 }
 
-fn trigger_observed<E: ContactEvent>(world: &mut World, events: &mut Vec<E>) {
+pub(crate) fn trigger_observed<E: ContactEvent>(world: &mut World, events: &mut Vec<E>) {
     for event in events.drain(..).flat_map(|event| [event, event.swapped()]) {
         let is_observed = observers::<E>(world).is_some_and(|observers| {
             !observers.global_observers().is_empty()
@@ -136,6 +136,58 @@ pub(crate) fn forget(mut touches: ResMut<Touches>) {
     touches.events.clear();
 }
 
+/// Contact of two entities as it is before it is solved: without an impulse.
+pub(crate) fn touch_of(
+    world: &TawWorld,
+    contact: &Contact<f32>,
+    on_wall: bool,
+) -> Option<ContactStarted> {
+    let first = if on_wall { TawWorld::wall_entity } else { TawWorld::marble_entity };
+    let (a, b) = (first(world, contact.a)?, world.marble_entity(contact.b)?);
+    let velocity = |row: u32| world.marbles.velocity()[row as usize];
+    let spin = |row: u32| world.marbles.angular_velocity().get(row as usize).copied();
+    let turning = |row: u32, arm: TawVec3<f32>| {
+        spin(row).map_or(Vec3::ZERO, |spin| from_vector(spin).cross(from_vector(arm)))
+    };
+    let point = world.marbles.position()[contact.b as usize] + contact.arms[1];
+    let of_first = if on_wall {
+        let row = contact.a as usize;
+        from_vector(world.walls.surface_velocity_of_row(row, point, contact.normal))
+    } else {
+        from_vector(velocity(contact.a)) + turning(contact.a, contact.arms[0])
+    };
+    let relative =
+        from_vector(velocity(contact.b)) + turning(contact.b, contact.arms[1]) - of_first;
+    let normal = from_vector(contact.normal);
+    let touch = ContactStarted {
+        pair: ContactPair { a, b },
+        normal,
+        point: from_point(point),
+        part: contact.part,
+        approach_speed: -relative.dot(normal),
+        slip_speed: relative.reject_from_normalized(normal).length(),
+        impulse: Vec3::ZERO,
+    };
+    // Rows move about; the order of entities does not.
+    Some(if !on_wall && b < a { touch.swapped() } else { touch })
+}
+
+/// Contact of two entities in an impact.
+pub(crate) fn touch_of_impact(world: &TawWorld, impact: &Impact<f32>) -> Option<ContactStarted> {
+    let first = if impact.on_wall { TawWorld::wall_entity } else { TawWorld::marble_entity };
+    let (a, b) = (first(world, impact.a)?, world.marble_entity(impact.b)?);
+    let touch = ContactStarted {
+        pair: ContactPair { a, b },
+        normal: from_vector(impact.normal),
+        point: from_point(impact.point),
+        part: impact.part,
+        approach_speed: impact.approach_speed,
+        slip_speed: length(impact.slip),
+        impulse: from_vector(impact.impulse),
+    };
+    Some(if !impact.on_wall && b < a { touch.swapped() } else { touch })
+}
+
 /// Notes who touches in this substep, before anything is restituted.
 pub(crate) fn collect(
     world: Res<TawWorld>,
@@ -145,45 +197,11 @@ pub(crate) fn collect(
     let event_driven = world.model().response == Response::EventDriven;
     // It lists who may rest on each other, and impacts of its own.
     let slowest = if event_driven { f32::INFINITY } else { fastest_rest(&world, delta.0) };
-    let velocity = |row: u32| world.marbles.velocity()[row as usize];
-    let point_of =
-        |contact: &Contact<f32>| world.marbles.position()[contact.b as usize] + contact.arms[1];
-    let spin = |row: u32| world.marbles.angular_velocity().get(row as usize).copied();
-    let turning = |row: u32, arm: TawVec3<f32>| {
-        spin(row).map_or(Vec3::ZERO, |spin| from_vector(spin).cross(from_vector(arm)))
-    };
-    let started = |pair: ContactPair, contact: &Contact<f32>, closing: TawVec3<f32>, on_wall| {
-        let (normal, point) = (from_vector(contact.normal), from_point(point_of(contact)));
-        let closing = from_vector(closing);
-        let first = if on_wall { Vec3::ZERO } else { turning(contact.a, contact.arms[0]) };
-        let relative = closing + turning(contact.b, contact.arms[1]) - first;
-        ContactStarted {
-            pair,
-            normal,
-            point,
-            part: contact.part,
-            approach_speed: -closing.dot(normal),
-            slip_speed: relative.reject_from_normalized(normal).length(),
-            impulse: Vec3::ZERO, // not solved yet
-        }
-    };
-    let wall_velocity = |contact: &Contact<f32>| {
-        let (row, normal) = (contact.a as usize, contact.normal);
-        world.walls.surface_velocity_of_row(row, point_of(contact), normal)
-    };
-    for contact in world.contacts.wm.iter().filter(|contact| contact.is_touching()) {
-        if let (Some(a), Some(b)) = (world.wall_entity(contact.a), world.marble_entity(contact.b)) {
-            let closing = velocity(contact.b) - wall_velocity(contact);
-            touches.add(started(ContactPair { a, b }, contact, closing, true), slowest);
-        }
-    }
-    for contact in world.contacts.mm.iter().filter(|contact| contact.is_touching()) {
-        if let (Some(a), Some(b)) = (world.marble_entity(contact.a), world.marble_entity(contact.b))
-        {
-            let closing = velocity(contact.b) - velocity(contact.a);
-            let touch = started(ContactPair { a, b }, contact, closing, false);
-            // Rows move about; the order of entities does not.
-            touches.add(if b < a { touch.swapped() } else { touch }, slowest);
+    for (contacts, on_wall) in [(&world.contacts.wm, true), (&world.contacts.mm, false)] {
+        for contact in contacts.iter().filter(|contact| contact.is_touching()) {
+            if let Some(touch) = touch_of(&world, contact, on_wall) {
+                touches.add(touch, slowest);
+            }
         }
     }
 }
@@ -201,20 +219,9 @@ pub(crate) fn collect_impacts(
     };
     // The list grows from substep to substep.
     for impact in world.impacts().iter().skip(touches.impacts) {
-        let first = if impact.on_wall { TawWorld::wall_entity } else { TawWorld::marble_entity };
-        let (Some(a), Some(b)) = (first(&world, impact.a), world.marble_entity(impact.b)) else {
-            continue;
-        };
-        let touch = ContactStarted {
-            pair: ContactPair { a, b },
-            normal: from_vector(impact.normal),
-            point: from_point(impact.point),
-            part: impact.part,
-            approach_speed: impact.approach_speed,
-            slip_speed: length(impact.slip),
-            impulse: from_vector(impact.impulse),
-        };
-        touches.add(if !impact.on_wall && b < a { touch.swapped() } else { touch }, slowest);
+        if let Some(touch) = touch_of_impact(&world, impact) {
+            touches.add(touch, slowest);
+        }
     }
     touches.impacts = world.impacts().len();
 }
@@ -236,35 +243,37 @@ pub(crate) fn write(
     events.hits.append(found);
     keep_fastest(&mut events.hits);
     for hit in events.hits.iter_mut().filter(|hit| hit.impulse == Vec3::ZERO) {
-        hit.impulse = impulse_of(&world, hit.pair);
+        hit.impulse = impulse_of(&world, hit.pair).impulse;
     }
     if let Some(messages) = hits {
         messages.write_batch(events.hits.iter().copied());
     }
-    now.extend(before.iter().filter_map(|&pair| {
+    now.extend(before.iter().filter_map(|&(pair, normal)| {
         let gap = gap(pair, &world, &marbles, &walls)?;
-        gap.is_closed(fall).then_some(ContactStarted::going_on(pair))
+        gap.is_closed(fall).then_some(ContactStarted::going_on(pair, normal))
     }));
     let per_second = 1.0 / step_of(&world, delta.0);
     // Stable, so that the first substep's touch stands for its pair.
     now.sort_by_key(|touch| touch.pair);
     now.dedup_by_key(|touch| touch.pair);
-    let mut last = before.iter().copied().peekable();
-    for touch in now.iter() {
+    let mut last = before.iter().map(|(pair, _)| *pair).peekable();
+    for touch in now.iter_mut() {
         while let Some(pair) = last.next_if(|pair| *pair < touch.pair) {
             tell(ended, &mut events.ended, ContactEnded { pair });
         }
+        let of_pair = impulse_of(&world, touch.pair);
         if last.next_if_eq(&touch.pair).is_some() {
-            let (pair, force) = (touch.pair, impulse_of(&world, touch.pair) * per_second);
-            tell(ongoing, &mut events.ongoing, ContactOngoing { pair, force });
+            touch.normal = of_pair.normal.unwrap_or(touch.normal);
+            let (pair, normal, force) = (touch.pair, touch.normal, of_pair.impulse * per_second);
+            tell(ongoing, &mut events.ongoing, ContactOngoing { pair, normal, force });
         } else {
-            let impulse = impulse_of(&world, touch.pair);
-            tell(started, &mut events.started, ContactStarted { impulse, ..*touch });
+            touch.impulse = of_pair.impulse;
+            tell(started, &mut events.started, *touch);
         }
     }
     last.for_each(|pair| tell(ended, &mut events.ended, ContactEnded { pair }));
     before.clear();
-    before.extend(now.drain(..).map(|touch| touch.pair));
+    before.extend(now.drain(..).map(|touch| (touch.pair, touch.normal)));
 }
 
 /// Keeps the fastest hit of each pair and direction, in the order found.
@@ -290,7 +299,7 @@ fn fastest_rest(world: &TawWorld, dt: f32) -> f32 {
 }
 
 /// Writes a message, and keeps it for observers.
-fn tell<M: Message + Copy>(
+pub(crate) fn tell<M: Message + Copy>(
     reader: &mut Option<ResMut<Messages<M>>>,
     events: &mut Vec<M>,
     message: M,

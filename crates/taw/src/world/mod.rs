@@ -58,6 +58,7 @@ pub use limits::SpeedLimits;
 pub use marble::{Damping, Marble};
 pub use marbles::Marbles;
 pub use model::{Detection, Model, Precision};
+pub use quarantine::StopReason;
 pub use query::{ColliderId, Queries, QueryHit, QueryTree};
 pub use sensors::{SensorEvent, SensorId, Sensors};
 #[cfg(test)]
@@ -111,7 +112,7 @@ pub struct World<S: Scalar> {
     /// Impacts of the last step, of a response that solves them within it.
     impacts: Vec<Impact<S>>,
     /// Marbles that the last step stopped, sorted by handle, each once.
-    quarantined: Vec<MarbleId>,
+    quarantined: Vec<(MarbleId, StopReason)>,
     memory: ContactMemory<S>,
     /// On the heap, since it is several kilobytes: a world is moved as a whole.
     scratch: Box<WorldScratch<S>>,
@@ -250,9 +251,16 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// Marbles that the last step stopped because their motion overflowed, each once.
+    /// Marbles that the last step stopped, each once: see [`stop_reason`](Self::stop_reason).
     pub fn stopped(&self) -> impl Iterator<Item = MarbleId> + '_ {
-        self.quarantined.iter().copied()
+        self.quarantined.iter().map(|(id, _)| *id)
+    }
+
+    /// Reason for which the last step stopped a marble, if it did.
+    #[must_use]
+    pub fn stop_reason(&self, id: MarbleId) -> Option<StopReason> {
+        let found = self.quarantined.binary_search_by_key(&id, |(id, _)| *id);
+        found.ok().map(|at| self.quarantined[at].1)
     }
 
     /// Impacts of the last step that are in no list of contacts: those of

@@ -11,6 +11,16 @@ use crate::error::{positive, within};
 use crate::math::{Point3, Quat, Scalar, is_finite, is_finite_point};
 use crate::response::rename_rows;
 
+/// Reason for which a step stopped a marble.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum StopReason {
+    /// Its position, rotation or velocity overflowed. No other marble is affected.
+    NotFinite,
+    /// It still had events when the budget of the step was spent, by
+    /// [`Response::EventDriven`]: thousands of collisions within a step, as between walls that close.
+    EventBudget,
+}
+
 /// Poses at the start of the substep.
 #[derive(Clone, Debug, Default)]
 pub(super) struct StoredPoses<S> {
@@ -127,9 +137,16 @@ impl<S: Scalar> World<S> {
         rename_rows(&mut self.memory.impulses, stays);
         rename_rows(&mut self.memory.springs, stays);
         rename_rows(&mut self.memory.event_impulses, stays);
-        self.quarantined.extend(rows.iter().filter_map(|row| self.marbles.id(*row as usize)));
+        // Of those that other responses stop, none is left from its time.
+        let events = self.settings.model.response == Response::EventDriven;
+        let unfinished = if events { self.scratch.events.unfinished.as_slice() } else { &[] };
+        self.quarantined.extend(rows.iter().filter_map(|row| {
+            let was_finite = unfinished.contains(row);
+            let reason = if was_finite { StopReason::EventBudget } else { StopReason::NotFinite };
+            Some((self.marbles.id(*row as usize)?, reason))
+        }));
         self.quarantined.sort_unstable();
-        self.quarantined.dedup();
+        self.quarantined.dedup_by_key(|(id, _)| *id);
         rows.clear();
         self.scratch.stopped = rows;
     }

@@ -3,7 +3,7 @@
 
 use taw::prelude::*;
 use taw::shape::{Aabb3, Capsule, Sphere};
-use taw::world::WallShape;
+use taw::world::{StopReason, WallShape};
 
 /// Tests that the documented budget of a step allows for one ball.
 const BUDGET: usize = 32_020_000;
@@ -124,6 +124,8 @@ fn cells_of_a_periodic_box_cost_what_they_take() {
         world.step(1.0 / 60.0).unwrap();
         let stopped: Vec<_> = world.stopped().collect();
         assert!(stopped.is_empty() || stopped == [id]);
+        assert!(world.stop_reason(id).is_none_or(|reason| reason == StopReason::EventBudget));
+        assert_eq!(world.stop_reason(id).is_some(), !stopped.is_empty());
         !stopped.is_empty()
     };
     assert!(stopped(1e8));

@@ -247,6 +247,8 @@ pub(crate) struct EventSolver {
     pub impulse_cache: Vec<CachedImpulse<f64>>,
     /// Energy bookkeeping, for the energy audit only.
     pub work: Option<EnergyLedger>,
+    /// Rows that still had events at the end of the last substep's budget, in any order.
+    pub unfinished: Vec<u32>,
     candidates: WallCandidates,
     cells: Cells,
     unbounded: Vec<usize>,
@@ -286,7 +288,8 @@ impl EventSolver {
             }
         }
         self.spent += settings.cost.get();
-        let mut stopped = self.stop_unfinished();
+        self.stop_unfinished();
+        let mut stopped = self.unfinished.clone();
         (0..self.balls.len()).for_each(|row| self.advance(row, dt));
         for (row, (ball, initial_positions)) in
             self.balls.iter_mut().zip(initial_positions).enumerate()
@@ -317,19 +320,18 @@ impl EventSolver {
     }
 
     /// Freezes balls that still have events at the end of the budget, at the time of the first of
-    /// these. Returns their rows.
-    fn stop_unfinished(&mut self) -> Vec<u32> {
-        let mut stopped = Vec::new();
+    /// these.
+    fn stop_unfinished(&mut self) {
+        self.unfinished.clear();
         let first = self.queue.peek().map_or(0.0, |Reverse(event)| event.time);
         for Reverse(Event { row, version, .. }) in std::mem::take(&mut self.queue) {
             if self.balls[row].trajectory.version == version {
                 self.advance(row, first.max(self.balls[row].trajectory.start));
                 self.balls[row].freeze();
                 self.balls[row].spin = Vec3::zero();
-                stopped.push(row as u32);
+                self.unfinished.push(row as u32);
             }
         }
-        stopped
     }
 
     fn process(&mut self, event: Event, settings: &EventSettings, impacts: &mut Vec<Impact<f64>>) {
