@@ -15,6 +15,7 @@ mod heroes;
 mod ignore;
 mod input;
 mod interpolation;
+mod joints;
 mod layers;
 mod lifts;
 mod mesh_walls;

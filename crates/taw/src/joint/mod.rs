@@ -20,8 +20,6 @@ mod system;
 
 pub use crate::handle::JointId;
 
-use cgmath::Zero;
-
 use crate::Error;
 use crate::error::{finite, positive, within};
 use crate::frame::Pose;
@@ -61,7 +59,7 @@ impl<S: Scalar> JointEnd<S> {
         Self::World { frame: Pose { translation, ..Pose::identity() } }
     }
 
-    /// The same end with its frame turned.
+    /// Turns its frame.
     #[must_use]
     pub fn with_rotation(mut self, rotation: Quat<S>) -> Self {
         let (Self::Marble { frame, .. } | Self::World { frame }) = &mut self;
@@ -287,7 +285,36 @@ pub(crate) struct JointState<S> {
     pub load: [S; 2],
 }
 
-/// Joints of a world, which only [`SoftStep`](crate::response::Response::SoftStep) knows.
+/// Joints of a world, which only [`SoftStep`](crate::response::Response::SoftStep) knows: other responses refuse to
+/// step a world that has some.
+///
+/// Marbles that a joint holds do not sleep. Their rotation counts if the model's is dynamic; else joints act on
+/// their centers alone. All joints are solved on one thread, which is exact but costs more the more joints are
+/// connected in a net: a chain takes a time in proportion to its length, a sheet more.
+///
+/// ```
+/// use taw::joint::{Joint, JointEnd, JointKind};
+/// use taw::prelude::*;
+///
+/// # fn main() -> Result<(), taw::Error> {
+/// let mut world = World::<f32>::default();
+/// world.set_model(Model::GAME)?;
+/// let ball = world.marbles.insert(Marble::new(Point3::new(1.0, 0.0, 0.0), 0.2))?;
+/// // A pendulum on a rod of a metre.
+/// let ends = [
+///     JointEnd::world(Point3::new(0.0, 0.0, 0.0)),
+///     JointEnd::marble(ball, Vec3::new(0.0, 0.0, 0.0)),
+/// ];
+/// let rod = world.joints.insert(Joint::new(JointKind::Distance([1.0, 1.0]), ends))?;
+/// for _ in 0..60 {
+///     world.step(1.0 / 60.0)?;
+/// }
+/// let at = world.marbles.get(ball)?.position;
+/// assert!((at.to_vec().magnitude() - 1.0).abs() < 1e-4);
+/// assert!(world.joints.force(rod)? > 0.0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Joints<S> {
     handles: Handles,

@@ -159,6 +159,11 @@ impl Response {
         matches!(self, Self::Impulse | Self::Penalty(_))
     }
 
+    /// True if a step stops what has more events than its budget.
+    pub(crate) fn has_event_budget(self) -> bool {
+        self == Self::EventDriven
+    }
+
     /// True if pairs are listed that met within the substep and are apart at its end.
     pub(crate) fn lists_grazes(self) -> bool {
         matches!(self, Self::Displacement | Self::Impulse)

@@ -25,7 +25,7 @@ pub(super) struct JointedBodies {
     system: JointSystem,
 }
 
-/// What a joint holds.
+/// Body of a joint: a marble, or an end in the world.
 #[derive(Clone, Copy, Debug)]
 enum Jointed {
     Marble(MarbleId),

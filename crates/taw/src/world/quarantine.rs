@@ -138,7 +138,7 @@ impl<S: Scalar> World<S> {
         rename_rows(&mut self.memory.springs, stays);
         rename_rows(&mut self.memory.event_impulses, stays);
         // Of those that other responses stop, none is left from its time.
-        let events = self.settings.model.response == Response::EventDriven;
+        let events = self.settings.model.response.has_event_budget();
         let unfinished = if events { self.scratch.events.unfinished.as_slice() } else { &[] };
         self.quarantined.extend(rows.iter().filter_map(|row| {
             let was_finite = unfinished.contains(row);
