@@ -5,6 +5,7 @@ use bevy::prelude::*;
 use bevy_taw::prelude::*;
 use bevy_taw::taw::joint::{Joint, JointEnd, JointKind};
 use bevy_taw::taw::math::{Point3, Vec3 as CoreVec3};
+use bevy_taw::taw::world::ColliderId;
 
 use crate::scene;
 
