@@ -14,7 +14,7 @@ const MAX_CORRECTION: f64 = 1.0;
 /// Body while joints are solved: a ball, or a place in the world.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JointBody {
-    /// Slot of a ball; [`NO_ROW`] for a place.
+    /// Slot of a ball; [`NO_ROW`] for a place in the world.
     pub slot: u32,
     /// Inverse mass in 1/kg, and inverse moment of inertia in 1/(kg m²); zero for what nothing moves or turns.
     pub inverse_mass: f64,
@@ -109,12 +109,11 @@ impl Row {
         of_end(0) + of_end(1)
     }
 
-    /// Error that a substep removes.
-    pub fn correction(&self, bodies: &[JointBody]) -> f64 {
+    /// Error that a substep removes; of a plain one, only a gap counts, which stays.
+    pub fn correction(&self, bodies: &[JointBody], is_plain: bool) -> f64 {
         let of_ends = self.bodies.map(|body| bodies[body as usize].radius);
-        let is_angle = self.geometry.linear.is_zero();
-        let unit = if is_angle { 1.0 } else { of_ends[0].min(of_ends[1]) };
-        let most = unit * MAX_CORRECTION;
+        let unit = if self.geometry.is_angle() { 1.0 } else { of_ends[0].min(of_ends[1]) };
+        let most = if is_plain { 0.0 } else { unit * MAX_CORRECTION };
         match self.geometry.rule {
             RowRule::AtLeastZero => self.geometry.error.max(-most), // a gap stays
             _ => self.geometry.error.clamp(-most, most),
@@ -163,7 +162,9 @@ impl Row {
 
     /// Decides if it is an equation, by its residual: not where the impulse is at a bound and would go beyond.
     pub fn update_active(&mut self, residual: f64, impulse: f64, [least, most]: [f64; 2]) -> bool {
-        let stays = (impulse <= least && residual >= 0.0) || (impulse >= most && residual <= 0.0);
+        let stays = residual.is_nan()
+            || (impulse <= least && residual >= 0.0)
+            || (impulse >= most && residual <= 0.0);
         std::mem::replace(&mut self.active, !stays) == stays
     }
 }

@@ -13,7 +13,7 @@ const MAX_GAIN: f64 = 0.02;
 
 impl JointSystem {
     /// Does something to velocities, and counts the kinetic energy that it adds to each group beyond the work of
-    /// motors, springs and places that move.
+    /// motors, springs, and bodies that nothing moves.
     pub(super) fn count_gain(&mut self, action: impl FnOnce(&mut Self)) {
         let impulses = |row: &Row| row.impulse + row.relaxation;
         let energy: Vec<_> = self.bodies.iter().map(JointBody::energy).collect();
@@ -33,11 +33,9 @@ impl JointSystem {
                 let of_place = |end: usize| {
                     let body = &self.bodies[row.bodies[end] as usize];
                     let [linear, angular] = row.jacobian(end);
-                    if body.slot == NO_ROW {
-                        linear.dot(body.velocity) + angular.dot(body.spin)
-                    } else {
-                        0.0
-                    }
+                    let drives = |inverse: f64, power: f64| if inverse > 0.0 { 0.0 } else { power };
+                    drives(body.inverse_mass, linear.dot(body.velocity))
+                        + drives(body.inverse_inertia, angular.dot(body.spin))
                 };
                 let places = of_place(0) + of_place(1);
                 let drives = match row.geometry.rule {

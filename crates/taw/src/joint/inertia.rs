@@ -4,7 +4,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::JointKind;
 use super::rows::JointFrames;
-use super::system::JointSystem;
+use super::system::{JointSystem, SystemJoint};
 use crate::math::Vec3;
 
 /// Part of the relative turn of two balls that a substep damps at most.
@@ -44,7 +44,12 @@ impl JointSystem {
     /// Damps how fast balls turn against each other about axes that a joint leaves free, where substeps of `h`
     /// seconds do not follow that: of balls that got inertia, and of joints that turn too far in a substep.
     pub(super) fn damp_bending(&mut self, h: f64) {
-        for joint in &self.joints {
+        let bends = |joint: &&SystemJoint| match joint.kind {
+            JointKind::Gear { .. } => false,
+            JointKind::Distance(..) | JointKind::Spring { .. } => joint.pull > 0.0,
+            _ => true,
+        };
+        for joint in self.joints.iter().filter(bends) {
             let pair = joint.bodies.map(|body| self.bodies[body as usize]);
             let excess = pair.map(|body| 1.0 - body.inverse[1] / body.inverse_inertia);
             // NaN for a place, or a rotation that is locked.

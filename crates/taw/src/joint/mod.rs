@@ -20,11 +20,15 @@ mod system;
 
 pub use crate::handle::JointId;
 
+use std::mem::discriminant;
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use crate::Error;
 use crate::error::{finite, positive, within};
 use crate::frame::Pose;
 use crate::handle::{Handles, MarbleId};
 use crate::math::{Point3, Quat, Scalar, Vec3};
+use crate::uncompared::Uncompared;
 pub(crate) use body::JointBody;
 pub(crate) use system::{JointSystem, SystemJoint};
 
@@ -84,7 +88,11 @@ impl<S: Scalar> JointEnd<S> {
     }
 }
 
-/// Spring and damper, by the motion of the two ends if nothing else moved them.
+/// Spring and damper, by the motion of the two ends if nothing else moved them: its stiffness is that frequency's
+/// for their effective mass along the spring.
+///
+/// A spring that swings by more than a quarter of a radian in a substep, 10 Hz at 240 substeps a second, is damped
+/// more than by its ratio.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointSpring<S> {
     /// Oscillations per second without damping, above zero.
@@ -105,7 +113,7 @@ pub enum JointMotor<S> {
     },
     /// Holds a position by a spring.
     Position {
-        /// Target, in rad from −π to π, or m along a slider.
+        /// Target, in rad within ±.99 π, or m along a slider.
         target: S,
         /// The spring.
         spring: JointSpring<S>,
@@ -115,19 +123,16 @@ pub enum JointMotor<S> {
 }
 
 /// Free axis of a joint: what limits and drives it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointDrive<S> {
-    /// Least and largest position, in rad within [−π, π], or m along a slider.
+    /// Least and largest position, in rad within ±.99 π, or m along a slider.
     pub limits: Option<[S; 2]>,
     /// Its motor.
     pub motor: Option<JointMotor<S>>,
 }
 
-impl<S> Default for JointDrive<S> {
-    fn default() -> Self {
-        Self { limits: None, motor: None }
-    }
-}
+/// Largest angle of a hinge, in rad: at half a turn it becomes its opposite.
+const MAX_ANGLE: f64 = 0.99 * std::f64::consts::PI;
 
 /// Kind of a joint: which motions it leaves free. The frames of both ends coincide where it is at zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -158,7 +163,8 @@ pub enum JointKind<S> {
         /// Drive of the turning.
         drive: JointDrive<S>,
     },
-    /// Gear: the first end turns about its z by `−ratio` times the turn of the second about its own z.
+    /// Gear: the first end turns about its z by `−ratio` times the turn of the second about its own z, both
+    /// relative to the world.
     Gear {
         /// Ratio of the two, other than zero; negative for a belt.
         ratio: S,
@@ -173,10 +179,11 @@ pub struct Joint<S> {
     /// Motions that it leaves free.
     pub kind: JointKind<S>,
     /// True if two marbles that it joins collide with each other.
-    pub collides: bool,
-    /// Force in N from which on it breaks; infinite for never.
+    pub collide_connected: bool,
+    /// Force in N beyond which it breaks; infinite for never. Anchors that are apart when the joint is made are
+    /// brought together within few substeps, by a force that may be large.
     pub breaking_force: S,
-    /// Torque in N m from which on it breaks; infinite for never.
+    /// Torque in N m beyond which it breaks; infinite for never.
     pub breaking_torque: S,
 }
 
@@ -185,7 +192,7 @@ impl<S: Scalar> Joint<S> {
     #[must_use]
     pub fn new(kind: JointKind<S>, ends: [JointEnd<S>; 2]) -> Self {
         let never = S::infinity();
-        Self { ends, kind, collides: false, breaking_force: never, breaking_torque: never }
+        Self { ends, kind, collide_connected: false, breaking_force: never, breaking_torque: never }
     }
 
     /// Validates all numbers.
@@ -213,9 +220,12 @@ impl<S: Scalar> JointKind<S> {
     fn validate(&self) -> Result<(), Error> {
         match self {
             Self::BallAndSocket | Self::Fixed => Ok(()),
-            Self::Hinge(drive) => drive.validate("limits", S::from_f64(std::f64::consts::PI)),
-            Self::Slider(drive) => drive.validate("limits", S::max_value()),
-            Self::Distance(range) => ordered("range", *range, [S::zero(), S::infinity()]),
+            Self::Hinge(drive) => drive.validate(S::from_f64(MAX_ANGLE)),
+            Self::Slider(drive) => drive.validate(S::max_value()),
+            Self::Distance(range) => {
+                within("range", range[0], S::zero(), S::max_value())?;
+                ordered("range", *range, [S::zero(), S::infinity()])
+            }
             Self::Spring { length, spring } => {
                 within("length", *length, S::zero(), S::max_value())?;
                 spring.validate()
@@ -223,11 +233,11 @@ impl<S: Scalar> JointKind<S> {
             Self::Wheel { spring, travel, drive } => {
                 spring.validate()?;
                 ordered("travel", *travel, [S::neg_infinity(), S::infinity()])?;
-                drive.validate("limits", S::from_f64(std::f64::consts::PI))
+                drive.validate(S::from_f64(MAX_ANGLE))
             }
             Self::Gear { ratio } => {
                 let is_zero = finite("ratio", *ratio)?.is_zero();
-                if is_zero { positive("ratio", *ratio).map(|_| ()) } else { Ok(()) }
+                if is_zero { positive("|ratio|", *ratio).map(|_| ()) } else { Ok(()) }
             }
         }
     }
@@ -240,9 +250,9 @@ fn ordered<S: Scalar>(field: &'static str, [low, high]: [S; 2], all: [S; 2]) -> 
 }
 
 impl<S: Scalar> JointDrive<S> {
-    fn validate(&self, field: &'static str, most: S) -> Result<(), Error> {
+    fn validate(&self, most: S) -> Result<(), Error> {
         if let Some(limits) = self.limits {
-            ordered(field, limits, [-most, most])?;
+            ordered("limits", limits, [-most, most])?;
         }
         let max = match self.motor {
             None => return Ok(()),
@@ -288,9 +298,9 @@ pub(crate) struct JointState<S> {
 /// Joints of a world, which only [`SoftStep`](crate::response::Response::SoftStep) knows: other responses refuse to
 /// step a world that has some.
 ///
-/// Marbles that a joint holds do not sleep. Their rotation counts if the model's is dynamic; else joints act on
-/// their centers alone. All joints are solved on one thread, which is exact but costs more the more joints are
-/// connected in a net: a chain takes a time in proportion to its length, a sheet more.
+/// Marbles that a joint holds do not sleep. Joints turn them if the model's rotation is dynamic. All joints are
+/// solved on one thread, which is exact but costs more the more joints are connected in a net: a chain takes a
+/// time in proportion to its length, a sheet more, and many joints of one marble the cube of their number.
 ///
 /// ```
 /// use taw::joint::{Joint, JointEnd, JointKind};
@@ -321,8 +331,8 @@ pub struct Joints<S> {
     pub(crate) states: Vec<JointState<S>>,
     /// Joints that broke in the last step.
     broken: Vec<JointId>,
-    /// Number of changes of joints that are there, and of what they join.
-    pub(crate) version: u64,
+    /// Number that no other change of joints has, of any world.
+    pub(crate) version: Uncompared<u64>,
 }
 
 impl<S: Scalar> Joints<S> {
@@ -335,16 +345,8 @@ impl<S: Scalar> Joints<S> {
     pub fn insert(&mut self, joint: Joint<S>) -> Result<JointId, Error> {
         let joint = joint.validated()?;
         let id = JointId(self.handles.push()?);
-        self.states.push(JointState {
-            frames_before: joint.ends.map(|end| end.frame()),
-            joint,
-            impulses: [0.0; rows::MAX_ROWS],
-            slip: 0.0,
-            pull: 0.0,
-            gain: 0.0,
-            load: [S::zero(); 2],
-        });
-        self.version += 1;
+        self.states.push(JointState::new(joint));
+        self.version = unique_version();
         Ok(id)
     }
 
@@ -366,10 +368,13 @@ impl<S: Scalar> Joints<S> {
         }
         let same_bodies = before.ends.map(|end| end.marble_id())
             == joint.ends.map(|end| end.marble_id())
-            && before.collides == joint.collides;
-        if !same_bodies || rows::count(&before.kind) != rows::count(&joint.kind) {
-            state.impulses = [0.0; rows::MAX_ROWS];
-            self.version += 1;
+            && before.collide_connected == joint.collide_connected;
+        let same_rows = discriminant(&before.kind) == discriminant(&joint.kind)
+            && rows::count(&before.kind) == rows::count(&joint.kind);
+        if !same_bodies || !same_rows {
+            let frames_before = state.frames_before;
+            *state = JointState { frames_before, ..JointState::new(joint) };
+            self.version = unique_version();
         }
         Ok(())
     }
@@ -380,7 +385,7 @@ impl<S: Scalar> Joints<S> {
     /// [`Error::NoSuchJoint`].
     pub fn remove(&mut self, id: JointId) -> Result<Joint<S>, Error> {
         let row = self.handles.swap_remove(id.0).ok_or(Error::NoSuchJoint(id))?;
-        self.version += 1;
+        self.version = unique_version();
         Ok(self.states.swap_remove(row).joint)
     }
 
@@ -392,7 +397,7 @@ impl<S: Scalar> Joints<S> {
         Ok(&self.states[self.row(id)?].joint)
     }
 
-    /// Largest force between its ends in the last step, in N: the mean over a substep.
+    /// Force between its ends in the last step, in N: the largest of the means over its substeps.
     ///
     /// # Errors
     /// [`Error::NoSuchJoint`].
@@ -400,7 +405,7 @@ impl<S: Scalar> Joints<S> {
         Ok(self.states[self.row(id)?].load[0])
     }
 
-    /// Largest torque between its ends in the last step, in N m: the mean over a substep.
+    /// Torque between its ends in the last step, in N m: the largest of the means over its substeps.
     ///
     /// # Errors
     /// [`Error::NoSuchJoint`].
@@ -435,9 +440,16 @@ impl<S: Scalar> Joints<S> {
         self.handles.row(id.0).ok_or(Error::NoSuchJoint(id))
     }
 
-    /// Takes out joints of marbles that are gone, and forgets which broke.
-    pub(crate) fn begin_step(&mut self, is_there: impl Fn(MarbleId) -> bool) {
+    /// Forgets which broke, and the loads of the last step.
+    pub(crate) fn begin_step(&mut self) {
         self.broken.clear();
+        for state in &mut self.states {
+            state.load = [S::zero(); 2];
+        }
+    }
+
+    /// Takes out joints of marbles that are gone.
+    pub(crate) fn remove_loose(&mut self, is_there: impl Fn(MarbleId) -> bool) {
         self.remove_where(|state| {
             let marbles = state.joint.ends.iter().filter_map(JointEnd::marble_id);
             marbles.into_iter().any(|marble| !is_there(marble))
@@ -464,7 +476,25 @@ impl<S: Scalar> Joints<S> {
     }
 }
 
+/// A number that no other change has.
+fn unique_version() -> Uncompared<u64> {
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    Uncompared(NEXT.fetch_add(1, Ordering::Relaxed))
+}
+
 impl<S: Scalar> JointState<S> {
+    fn new(joint: Joint<S>) -> Self {
+        Self {
+            frames_before: joint.ends.map(|end| end.frame()),
+            joint,
+            impulses: [0.0; rows::MAX_ROWS],
+            slip: 0.0,
+            pull: 0.0,
+            gain: 0.0,
+            load: [S::zero(); 2],
+        }
+    }
+
     /// Kind in the numbers of the solver.
     pub(crate) fn kind(&self) -> JointKind<f64> {
         self.joint.kind.cast()

@@ -1,5 +1,7 @@
 //! Rows of each kind of joint: position error and Jacobian, from the frames of its two ends.
 
+use std::f64::consts::TAU;
+
 use cgmath::{InnerSpace, Zero};
 
 use super::spring::SpringRow;
@@ -7,8 +9,8 @@ use super::{JointDrive, JointKind, JointMotor, JointSpring};
 use crate::frame::Pose;
 use crate::math::{Quat, Scalar, Vec3, normalize_and_length};
 
-/// Largest number of rows of a joint: those of a hinge with limits and a motor.
-pub(super) const MAX_ROWS: usize = 8;
+/// Largest number of rows of a joint: those of a wheel with stops, limits and a motor.
+pub(super) const MAX_ROWS: usize = 10;
 
 /// Row of a joint at the poses of its ends: velocities change its error by `linear · (v₂ − v₁) + angular₁ · ω₁ +
 /// angular₂ · ω₂`, with velocities of the centers.
@@ -59,8 +61,9 @@ pub(super) fn count<S: Scalar>(kind: &JointKind<S>) -> usize {
             (_, low, high) => usize::from(low) + usize::from(high),
         },
         JointKind::Spring { .. } | JointKind::Gear { .. } => 1,
-        // Suspension: its two ends, and the spring.
-        JointKind::Wheel { drive, .. } => 7 + of_drive(&JointDrive { limits: None, ..*drive }),
+        JointKind::Wheel { travel, drive, .. } => {
+            5 + of_drive(drive) + travel.iter().filter(|stop| stop.is_finite()).count()
+        }
     }
 }
 
@@ -105,10 +108,14 @@ impl JointFrames {
                 self.hold([y, z], push);
                 self.align_z([x, y], push);
                 let way = self.along(x);
-                push(way.beyond(travel[0]).one_sided());
-                push(way.beyond(travel[1]).reversed().one_sided());
+                if travel[0].is_finite() {
+                    push(way.beyond(travel[0]).one_sided());
+                }
+                if travel[1].is_finite() {
+                    push(way.beyond(travel[1]).reversed().one_sided());
+                }
                 push(way.sprung(spring, f64::INFINITY));
-                drive_rows(&JointDrive { limits: None, ..drive }, about(z, 0.0), push);
+                drive_rows(&drive, about(z, self.twist()), push);
             }
             JointKind::Gear { ratio } => {
                 let other = self.frames[1].rotation * Vec3::unit_z();
@@ -196,7 +203,7 @@ fn about(axis: Vec3<f64>, angle: f64) -> RowGeometry {
 fn drive_rows(drive: &JointDrive<f64>, row: RowGeometry, push: &mut impl FnMut(RowGeometry)) {
     match drive.limits {
         None => {}
-        Some([low, high]) if low == high => push(row.beyond(low)),
+        Some([low, high]) if low == high => push(row.beyond(low).wrapped()),
         Some([low, high]) => {
             push(row.beyond(low).one_sided());
             push(row.beyond(high).reversed().one_sided());
@@ -208,7 +215,7 @@ fn drive_rows(drive: &JointDrive<f64>, row: RowGeometry, push: &mut impl FnMut(R
             push(RowGeometry { rule: RowRule::Speed { target, max }, ..row });
         }
         Some(JointMotor::Position { target, spring, max }) => {
-            push(row.beyond(target).sprung(spring, max));
+            push(row.beyond(target).wrapped().sprung(spring, max));
         }
     }
 }
@@ -217,6 +224,17 @@ impl RowGeometry {
     /// Row whose error is zero at this position.
     fn beyond(self, position: f64) -> Self {
         Self { error: self.error - position, ..self }
+    }
+
+    /// Row whose error is the nearest way, if it is an angle.
+    fn wrapped(self) -> Self {
+        let turns = if self.is_angle() { (self.error / TAU).round() } else { 0.0 };
+        Self { error: self.error - turns * TAU, ..self }
+    }
+
+    /// Returns true if its error is an angle.
+    pub fn is_angle(&self) -> bool {
+        self.linear.is_zero()
     }
 
     /// Row in the other direction.

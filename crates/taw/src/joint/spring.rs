@@ -9,6 +9,8 @@ use crate::math::Scalar;
 /// faster, and has to be stable too.
 const EXACT: f64 = 0.25;
 const IMPLICIT: f64 = 0.5;
+/// Largest frequency in Hz, and damping ratio.
+const MAX: f64 = 1e9;
 /// Smallest loss of speed in a substep, as a fraction: the compliance is its reciprocal.
 const LEAST_LOSS: f64 = 1e-9;
 
@@ -47,6 +49,8 @@ impl SpringKick {
 
 impl SpringRow {
     pub fn new(frequency: f64, damping_ratio: f64) -> Self {
+        // Beyond that a substep is as long as for ever.
+        let [frequency, damping_ratio] = [frequency, damping_ratio].map(|x| x.min(MAX));
         Self { angular_frequency: frequency * TAU, damping_ratio }
     }
 

@@ -1,6 +1,7 @@
 //! System of all joints in a substep: rows, their matrix, and the impulses that satisfy them.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::TAU;
 
 use cgmath::{InnerSpace, Zero};
 
@@ -26,6 +27,8 @@ const UNRESOLVED: f64 = 1.0;
 /// from which on it is.
 const MAX_ATTEMPTS: u32 = 6;
 const MAX_EXCESS: f64 = 1.5;
+/// Largest change of speed in a substep, over the fastest of a group and one radius per substep.
+const MAX_LEAP: f64 = 4.0;
 /// Part of the force of the last substep that counts in this one.
 const KEPT: f64 = 0.95;
 
@@ -46,6 +49,8 @@ pub(crate) struct SystemJoint {
     /// Kinetic energy that its group has gained beyond the work of motors and springs, in J; counted at the
     /// first joint of each group.
     pub gain: f64,
+    /// True at the first joint of a group of which velocities alone are solved in this substep.
+    plain: bool,
     /// First joint of its group: of those that are connected by balls.
     pub(super) group: usize,
     /// Index of its first row.
@@ -82,6 +87,7 @@ impl SystemJoint {
             load,
             pull: 0.0,
             gain: 0.0,
+            plain: false,
             group: 0,
             first: 0,
         }
@@ -200,9 +206,14 @@ impl JointSystem {
         self.count_gain(|joints| joints.attempt(h));
     }
 
-    /// Solves a substep, with as much inertia as it turns out to need.
+    /// Solves a substep, with as much inertia as it turns out to need. Groups that would leap are solved by
+    /// velocities alone, which always has a solution that gains no energy.
     fn attempt(&mut self, h: f64) {
         let start: Vec<_> = self.bodies.iter().map(|body| (body.velocity, body.spin)).collect();
+        for joint in &mut self.joints {
+            joint.pull *= KEPT;
+            joint.plain = false;
+        }
         for _ in 0..MAX_ATTEMPTS {
             for (body, start) in self.bodies.iter_mut().zip(&start) {
                 (body.velocity, body.spin) = *start;
@@ -216,10 +227,34 @@ impl JointSystem {
             let too_light = |(body, [mass, inertia]): (&JointBody, &[f64; 2])| {
                 body.inverse[0] * mass > MAX_EXCESS || body.inverse[1] * inertia > MAX_EXCESS
             };
-            if !self.bodies.iter().zip(&needs).any(too_light) {
+            let leapt = self.find_leaps(&start, h);
+            if !leapt && !self.bodies.iter().zip(&needs).any(too_light) {
                 break;
             }
         }
+    }
+
+    /// Marks the groups of which a body got a speed that no motion of the group explains, nor the largest
+    /// correction. Returns true if there are new ones.
+    fn find_leaps(&mut self, start: &[(Vec3<f64>, Vec3<f64>)], h: f64) -> bool {
+        let mut fastest = vec![0.0_f64; self.joints.len()];
+        let arm = |body: &JointBody| if body.radius.is_finite() { body.radius } else { 0.0 };
+        for ((body, (velocity, spin)), group) in
+            self.bodies.iter().zip(start).zip(&self.group_of_body)
+        {
+            let speed = velocity.magnitude() + spin.magnitude() * arm(body);
+            fastest[*group] = fastest[*group].max(speed);
+        }
+        let mut any = false;
+        for ((body, (velocity, _)), group) in self.bodies.iter().zip(start).zip(&self.group_of_body)
+        {
+            let change = (body.velocity - velocity).magnitude();
+            let most = MAX_LEAP * (fastest[*group] + arm(body) / h);
+            if body.slot != NO_ROW && (change > most || change.is_nan()) {
+                any |= !std::mem::replace(&mut self.joints[*group].plain, true);
+            }
+        }
+        any
     }
 
     /// Applies the impulses of the last substep.
@@ -234,7 +269,7 @@ impl JointSystem {
         }
     }
 
-    /// Finds the impulse of each joint's force in this substep; between anchors that are apart, only what pulls
+    /// Finds the impulse of each joint's force in this substep, if it is larger than known; between anchors that are apart, only what pulls
     /// them together counts.
     fn find_pulls(&mut self) {
         for index in 0..self.joints.len() {
@@ -251,11 +286,11 @@ impl JointSystem {
                 _ => impulse.magnitude(),
             };
             let joint = &mut self.joints[index];
-            joint.pull = pull.max(joint.pull * KEPT);
+            joint.pull = pull.max(joint.pull);
         }
     }
 
-    /// Lists the rows where the bodies are, and the entries of the matrix.
+    /// Lists the rows where the bodies are.
     fn list_rows(&mut self) {
         let mut rows = std::mem::take(&mut self.rows);
         let before = rows.clone();
@@ -269,7 +304,6 @@ impl JointSystem {
             });
         }
         self.rows = rows;
-        self.list_entries();
     }
 
     /// Lists the entries of the matrix.
@@ -322,15 +356,19 @@ impl JointSystem {
         let mut residual = std::mem::take(&mut self.residual);
         residual.clear();
         for joint in &self.joints {
-            let resolved = self.resolved(joint, h);
+            let is_plain = self.joints[joint.group].plain;
+            let resolved = if is_plain { 0.0 } else { self.resolved(joint, h) };
             let frames = self.frames(joint, |body| body.pose_after(h));
             frames.rows(&joint.kind, |after| {
                 let row = &self.rows[residual.len()];
                 residual.push(match row.geometry.rule {
                     RowRule::Zero | RowRule::AtLeastZero => {
                         let linear = row.change(&self.bodies, |body| body.motion(h));
-                        let curved = after.error - row.geometry.error - linear;
-                        (row.correction(&self.bodies) + linear + curved * resolved) / h
+                        let mut curved = after.error - row.geometry.error - linear;
+                        if after.is_angle() {
+                            curved -= (curved / TAU).round() * TAU;
+                        }
+                        (row.correction(&self.bodies, is_plain) + linear + curved * resolved) / h
                     }
                     RowRule::Speed { target, .. } => row.speed(&self.bodies) - target,
                     RowRule::Gear => row.speed(&self.bodies) + joint.slip / h,
@@ -388,6 +426,7 @@ impl JointSystem {
     /// Begins to make velocities right at the end of a substep of `h` seconds.
     pub fn begin_relaxation(&mut self, h: f64) {
         self.list_rows();
+        self.list_entries();
         self.count_gain(|joints| {
             joints.damp_bending(h);
             joints.relax(h);

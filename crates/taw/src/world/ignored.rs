@@ -86,7 +86,7 @@ impl<S: Scalar> World<S> {
     pub(super) fn find_ignored_rows(&mut self) {
         let (marbles, walls) = (&self.marbles, &self.walls);
         let counts = [marbles.len() as u64, walls.len() as u64];
-        let versions = [marbles.removals(), walls.removals(), self.joints.version];
+        let versions = [marbles.removals(), walls.removals(), *self.joints.version];
         let now = Some((counts, versions));
         if self.marbles.ignored_rows.found_at == now {
             return;

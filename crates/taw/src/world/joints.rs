@@ -47,17 +47,21 @@ impl<S: Scalar> World<S> {
 
     /// Finds what joints hold, if that changed: those marbles do not sleep.
     pub(super) fn find_jointed(&mut self) {
-        let now = [self.joints.version, self.marbles.removals()];
+        let removals = self.marbles.removals();
+        if self.scratch.soft_step.jointed.known == Some([*self.joints.version, removals]) {
+            return;
+        }
+        self.joints.remove_loose(|id| self.marbles.row(id).is_ok());
         let jointed = &mut self.scratch.soft_step.jointed;
-        if jointed.known == Some(now) {
-            return;
-        }
         let had_none = jointed.is_jointed.is_empty();
-        *jointed = JointedBodies { known: Some(now), ..JointedBodies::default() };
-        if self.joints.is_empty() && had_none {
+        let known = Some([*self.joints.version, removals]);
+        *jointed = JointedBodies { known, ..JointedBodies::default() };
+        if !(self.joints.is_empty() && had_none) {
+            self.marbles.changed.add_all();
+        }
+        if self.joints.is_empty() {
             return;
         }
-        self.marbles.changed.add_all();
         let mut of_marble = BTreeMap::new();
         let mut joints = Vec::with_capacity(self.joints.len());
         for (joint, state) in self.joints.states.iter().enumerate() {
@@ -112,7 +116,8 @@ impl<S: Scalar> World<S> {
         }
         for (joint, state) in system.joints.iter_mut().zip(&self.joints.states) {
             (joint.kind, joint.impulses, joint.slip) = (state.kind(), state.impulses, state.slip);
-            (joint.load, joint.pull, joint.gain) = ([0.0; 2], state.pull, state.gain);
+            joint.load = state.load.map(S::as_f64);
+            (joint.pull, joint.gain) = (state.pull, state.gain);
             joint.frames = state.joint.ends.map(|end| match end {
                 JointEnd::Marble { frame, .. } => cast_pose(frame),
                 JointEnd::World { .. } => Pose::identity(),
@@ -123,7 +128,10 @@ impl<S: Scalar> World<S> {
 
     /// Reads a marble that a joint holds.
     fn read_jointed(&self, id: MarbleId, body: &mut JointBody) {
-        let Ok(row) = self.marbles.row(id) else { return };
+        let Ok(row) = self.marbles.row(id) else {
+            *body = JointBody::place(Pose::identity()); // those were taken out
+            return;
+        };
         let marbles = &self.marbles;
         let mass = marbles.mass(row);
         body.slot = self.scratch.soft_step.slot_of_marble[row];
@@ -148,6 +156,7 @@ impl<S: Scalar> World<S> {
             (state.impulses, state.slip) = (joint.impulses, joint.slip);
             (state.pull, state.gain) = (joint.pull, joint.gain);
             state.load = joint.load.map(S::from_f64);
+            state.frames_before = state.joint.ends.map(|end| end.frame());
         }
         for (body, is) in system.bodies.iter().zip(&self.scratch.soft_step.jointed.bodies) {
             if let Jointed::Marble(id) = is
@@ -165,7 +174,7 @@ impl<S: Scalar> World<S> {
 impl<S: Scalar> Joints<S> {
     /// Pairs of marbles that joints keep from colliding with each other.
     pub(super) fn ignored_pairs(&self) -> impl Iterator<Item = [MarbleId; 2]> + '_ {
-        self.states.iter().filter(|state| !state.joint.collides).filter_map(|state| {
+        self.states.iter().filter(|state| !state.joint.collide_connected).filter_map(|state| {
             let [a, b] = state.joint.ends.map(|end| end.marble_id());
             Some([a?, b?])
         })

@@ -185,6 +185,7 @@ impl<S: Scalar> World<S> {
             self.drop_missing_contacts();
         }
         self.audit_contacts();
+        self.find_jointed();
         self.sync_bodies()?; // somebody may have moved some since the first verb
         self.walls.update_tree();
         self.audit_rows_before();

@@ -18,7 +18,8 @@ impl<S: Scalar> World<S> {
     /// # Errors
     /// [`Error::NotPositive`] for `dt`; [`Error::OutOfRange`] if it, or a substep of it, is not in
     /// [`World::TIMES`]; [`Error::UnsupportedShape`] for a capsule in a world that is event-driven,
-    /// periodic, or steps by `SoftStep`; [`Error::OutOfRange`] for a marble too large for its
+    /// periodic, or steps by `SoftStep`; [`Error::Unsupported`] for [joints](Self::joints) by another
+    /// response; [`Error::OutOfRange`] for a marble too large for its
     /// [period](Self::set_period), and by `SoftStep` for one that was set to a radius of less than
     /// 1e-9 m, or to a position, velocity or surface speed of over 1e12 m or m/s;
     /// [`Error::TooManyPairs`] if more than [`World::MAX_PAIRS`] overlap, as from some 16,400 marbles
@@ -208,7 +209,7 @@ impl<S: Scalar> World<S> {
         self.quarantined.clear();
         self.impacts.clear();
         self.sensors.begin_step();
-        self.joints.begin_step(|id| self.marbles.row(id).is_ok());
+        self.joints.begin_step();
         self.reset_audit();
     }
 

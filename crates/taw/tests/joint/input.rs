@@ -105,7 +105,10 @@ fn marbles_of_a_joint_pass_through_each_other_unless_they_collide() {
         world.set_gravity(vector(0.0, 0.0, 0.0)).unwrap();
         let ids = [0.0, 0.15].map(|x| marble(&mut world, x, 0.0, 0.0));
         let ends = ids.map(|id| JointEnd::marble(id, vector(0.0, 0.0, 0.0)));
-        let joint = Joint { collides, ..Joint::new(JointKind::Distance([0.0, 1.0]), ends) };
+        let joint = Joint {
+            collide_connected: collides,
+            ..Joint::new(JointKind::Distance([0.0, 1.0]), ends)
+        };
         world.joints.insert(joint).unwrap();
         for _ in 0..60 {
             step(&mut world);
@@ -167,4 +170,77 @@ fn a_clone_goes_on_with_the_same_bits_on_any_number_of_threads() {
         step(&mut other);
         assert!(world.marbles == other.marbles && world.joints == other.joints);
     }
+}
+
+/// Marbles, and whole lists of joints, come and go between the verbs of a step.
+#[test]
+fn joints_follow_what_happens_between_the_verbs() {
+    let mut world = world::<f32>(4);
+    let ids: Vec<_> = (0..4).map(|i| marble(&mut world, f64::from(i), 0.0, 0.0)).collect();
+    let rod = |i: usize| {
+        let ends = [ids[i], ids[i + 1]].map(|id| JointEnd::marble(id, vector(0.0, 0.0, 0.0)));
+        Joint::new(JointKind::Distance([1.0; 2]), ends)
+    };
+    world.joints.insert(rod(0)).unwrap();
+    step(&mut world);
+    let saved = world.joints.clone();
+    world.joints.insert(rod(1)).unwrap();
+    world.joints.insert(rod(2)).unwrap();
+    step(&mut world);
+    // Fewer joints, with as many changes.
+    world.joints = saved;
+    world.joints.insert(rod(2)).unwrap();
+    world.joints.insert(rod(1)).unwrap();
+    let last = world.joints.ids().last().unwrap();
+    world.joints.remove(last).unwrap();
+    step(&mut world);
+    for gone in [0, 3] {
+        world.begin_step();
+        world.integrate(1.0 / 60.0).unwrap();
+        world.marbles.remove(ids[gone]).unwrap();
+        world.generate_contacts();
+        world.restitute(1.0 / 60.0).unwrap();
+        world.end_step();
+    }
+    assert!(world.joints.is_empty());
+    // One of a marble that is gone is taken out as soon as somebody steps.
+    world.joints.insert(rod(0)).unwrap();
+    world.restitute(1.0 / 60.0).unwrap();
+    assert!(world.joints.is_empty());
+}
+
+#[test]
+fn a_marble_of_infinite_mass_lifts_what_it_holds() {
+    let mut world = world::<f32>(4);
+    let ids = [0.0, 1.0].map(|x| marble(&mut world, x, 0.0, 0.0));
+    world.marbles.set_mass(ids[0], Mass::Infinite).unwrap();
+    world.marbles.set_velocity(ids[0], vector(0.0, 1.0, 0.0)).unwrap();
+    let ends = [
+        JointEnd::marble(ids[0], vector(0.0, 0.0, 0.0)),
+        JointEnd::marble(ids[1], vector(-1.0, 0.0, 0.0)),
+    ];
+    join(&mut world, JointKind::Fixed, ends);
+    for _ in 0..120 {
+        step(&mut world);
+    }
+    assert!((position(&world, ids[1]) - Vec3::new(1.0, 2.0, 0.0)).magnitude() < 1e-4);
+    assert!((velocity(&world, ids[1]) - Vec3::new(0.0, 1.0, 0.0)).magnitude() < 1e-4);
+}
+
+#[test]
+fn a_suspension_without_stops_bears() {
+    let mut world = world::<f64>(4);
+    let id = marble(&mut world, 0.0, 0.0, 0.0);
+    let spring = JointSpring { frequency: 2.0, damping_ratio: 1.0 };
+    let travel = [f64::NEG_INFINITY, f64::INFINITY];
+    let kind = JointKind::Wheel { spring, travel, drive: JointDrive::default() };
+    let upright = taw::math::Quat::from_sv(0.5_f64.sqrt(), Vec3::unit_z() * 0.5_f64.sqrt());
+    let ends = [place(0.0, 0.0, 0.0), JointEnd::marble(id, vector(0.0, 0.0, 0.0))];
+    join(&mut world, kind, ends.map(|end| end.with_rotation(upright)));
+    for _ in 0..300 {
+        step(&mut world);
+    }
+    let sag = 9.81 / (2.0 * std::f64::consts::TAU).powi(2);
+    assert!((position(&world, id).y / -sag - 1.0).abs() < 2e-3, "{:?}", position(&world, id));
+    assert!(velocity(&world, id).magnitude() < 1e-4);
 }

@@ -4,6 +4,7 @@ mod chains;
 mod drives;
 mod input;
 mod pendulums;
+mod random;
 mod springs;
 
 use taw::joint::{Joint, JointEnd, JointKind};

@@ -36,6 +36,9 @@ impl<S: Scalar> Swarm<S> {
         }
         self.pass(Pass::Solve(*params), |_, _| true);
         self.solve_unconverged(params);
+        if self.has_joints() {
+            self.find_falls(params.time, share); // contacts may bear some now
+        }
         self.with_joints(|joints| joints.solve(h));
     }
 
