@@ -34,7 +34,7 @@ pub(crate) struct JointBody {
 
 /// Row while it is solved.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Row {
+pub(super) struct JointRow {
     pub bodies: [u32; 2],
     pub geometry: RowGeometry,
     /// Impulses accumulated in the substep: by positions, and by velocities at its end.
@@ -87,7 +87,7 @@ impl JointBody {
     }
 }
 
-impl Row {
+impl JointRow {
     /// Jacobian of an end: of its velocity, and of its angular velocity.
     pub fn jacobian(&self, end: usize) -> [Vec3<f64>; 2] {
         let RowGeometry { linear, angular, .. } = self.geometry;

@@ -3,7 +3,7 @@
 use cgmath::InnerSpace;
 
 use super::body::JointBody;
-use super::body::Row;
+use super::body::JointRow;
 use super::rows::RowRule;
 use super::system::JointSystem;
 use crate::handle::NO_ROW;
@@ -15,7 +15,7 @@ impl JointSystem {
     /// Does something to velocities, and counts the kinetic energy that it adds to each group beyond the work of
     /// motors, springs, and bodies that nothing moves.
     pub(super) fn count_gain(&mut self, action: impl FnOnce(&mut Self)) {
-        let impulses = |row: &Row| row.impulse + row.relaxation;
+        let impulses = |row: &JointRow| row.impulse + row.relaxation;
         let energy: Vec<_> = self.bodies.iter().map(JointBody::energy).collect();
         let before: Vec<_> =
             self.rows.iter().map(|row| (impulses(row), row.speed(&self.bodies))).collect();

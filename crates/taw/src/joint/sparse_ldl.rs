@@ -8,7 +8,7 @@ const NONE: u32 = u32::MAX;
 
 /// Entry of the upper triangle: its row and column, and where its value is.
 #[derive(Clone, Copy, Debug)]
-struct Entry {
+struct MatrixEntry {
     row: u32,
     value: u32,
 }
@@ -20,7 +20,7 @@ pub(super) struct SparseLdl {
     order: Vec<u32>,
     place: Vec<u32>,
     /// Upper triangle by columns, in the order of elimination, without the diagonal.
-    columns: Vec<Vec<Entry>>,
+    columns: Vec<Vec<MatrixEntry>>,
     /// Elimination tree, and the number of entries of each column of `L`.
     parent: Vec<u32>,
     begin: Vec<usize>,
@@ -45,7 +45,7 @@ impl SparseLdl {
         self.columns = vec![Vec::new(); n];
         for (value, [a, b]) in (0..).zip(pairs) {
             let [a, b] = [self.place[*a as usize], self.place[*b as usize]];
-            self.columns[a.max(b) as usize].push(Entry { row: a.min(b), value });
+            self.columns[a.max(b) as usize].push(MatrixEntry { row: a.min(b), value });
         }
         self.parent = vec![NONE; n];
         self.flags = vec![NONE; n];
@@ -83,7 +83,7 @@ impl SparseLdl {
         for column in 0..self.order.len() {
             pattern.clear();
             self.flags[column] = column as u32;
-            for Entry { row, value } in &self.columns[column] {
+            for MatrixEntry { row, value } in &self.columns[column] {
                 self.sums[*row as usize] += values[*value as usize];
                 let mut row = *row;
                 while self.flags[row as usize] != column as u32 {

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use cgmath::{InnerSpace, Zero};
 
 use super::JointKind;
-use super::body::{JointBody, Row};
+use super::body::{JointBody, JointRow};
 use super::elimination::elimination_order;
 use super::rows::{JointFrames, MAX_ROWS, RowRule, count};
 use super::sparse_ldl::SparseLdl;
@@ -18,7 +18,7 @@ use crate::math::{Vec3, normalize_and_length};
 /// angle that the joint turns in it, times that of the one before.
 const ITERATIONS: u32 = 3;
 /// Number of times at most, while rows begin or cease to act.
-const MAX_ITERATIONS: u32 = 12;
+pub(super) const MAX_ITERATIONS: u32 = 12;
 /// Angle in rad by which a joint may turn in a substep, so that positions at its end count in full, and from
 /// which on they do not: there the joint only follows its directions at the begin, which takes energy.
 const RESOLVED: f64 = 0.5;
@@ -62,15 +62,15 @@ pub(crate) struct SystemJoint {
 pub(crate) struct JointSystem {
     pub bodies: Vec<JointBody>,
     pub joints: Vec<SystemJoint>,
-    pub(super) rows: Vec<Row>,
+    pub(super) rows: Vec<JointRow>,
     /// Rows that act on one body, and the entry of the matrix for each pair.
     pairs: Vec<[u32; 2]>,
     values: Vec<f64>,
-    diagonal: Vec<f64>,
+    pub(super) diagonal: Vec<f64>,
     matrix: SparseLdl,
     /// Entries of the rows that are equations, as they were factorized.
     known: (Vec<f64>, Vec<f64>),
-    residual: Vec<f64>,
+    pub(super) residual: Vec<f64>,
     /// First joint of the group of each body.
     pub(super) group_of_body: Vec<usize>,
 }
@@ -271,7 +271,7 @@ impl JointSystem {
 
     /// Finds the impulse of each joint's force in this substep, if it is larger than known; between anchors that are apart, only what pulls
     /// them together counts.
-    fn find_pulls(&mut self) {
+    pub(super) fn find_pulls(&mut self) {
         for index in 0..self.joints.len() {
             let rows = &self.rows[self.rows_of(index)];
             let impulse = rows
@@ -291,7 +291,7 @@ impl JointSystem {
     }
 
     /// Lists the rows where the bodies are.
-    fn list_rows(&mut self) {
+    pub(super) fn list_rows(&mut self) {
         let mut rows = std::mem::take(&mut self.rows);
         let before = rows.clone();
         rows.clear();
@@ -300,14 +300,14 @@ impl JointSystem {
             self.frames(joint, |body| body.pose).rows(&joint.kind, |geometry| {
                 let (impulse, active) =
                     before.get(rows.len()).map_or((0.0, true), |row| (row.impulse, row.active));
-                rows.push(Row { bodies, geometry, impulse, relaxation: 0.0, active });
+                rows.push(JointRow { bodies, geometry, impulse, relaxation: 0.0, active });
             });
         }
         self.rows = rows;
     }
 
     /// Lists the entries of the matrix.
-    fn list_entries(&mut self) {
+    pub(super) fn list_entries(&mut self) {
         let (rows, bodies) = (&self.rows, &self.bodies);
         self.diagonal.clear();
         self.diagonal.extend(rows.iter().map(|row| row.response(row, bodies)));
@@ -333,7 +333,7 @@ impl JointSystem {
             if iteration >= ITERATIONS && !changed {
                 return;
             }
-            let compliance = |row: &Row| match row.geometry.rule {
+            let compliance = |row: &JointRow| match row.geometry.rule {
                 RowRule::Spring { spring, .. } => spring.step(h).kicks[0].compliance,
                 _ => 0.0,
             };
@@ -387,7 +387,7 @@ impl JointSystem {
 
     /// Makes of the residuals the changes of impulse that remove them; `compliance` is that of a row, over its
     /// inverse effective mass.
-    fn solve_linear(&mut self, compliance: impl Fn(&Row) -> f64) {
+    pub(super) fn solve_linear(&mut self, compliance: impl Fn(&JointRow) -> f64) {
         let active = |row: u32| self.rows[row as usize].active;
         let rows = self.rows.iter().zip(&self.diagonal);
         let diagonal = rows.map(|(row, entry)| {
@@ -423,78 +423,8 @@ impl JointSystem {
         }
     }
 
-    /// Begins to make velocities right at the end of a substep of `h` seconds.
-    pub fn begin_relaxation(&mut self, h: f64) {
-        self.list_rows();
-        self.list_entries();
-        self.count_gain(|joints| {
-            joints.damp_bending(h);
-            joints.relax(h);
-        });
-    }
-
-    /// Makes velocities right at the end of a substep of `h` seconds, after others changed some, and stores
-    /// impulses and loads.
-    pub fn finish_relaxation(&mut self, h: f64) {
-        self.count_gain(|joints| joints.relax(h));
-        self.limit_gain();
-        self.find_pulls();
-        self.store(h);
-    }
-
-    /// Finds impulses by which velocities are right.
-    fn relax(&mut self, h: f64) {
-        let is_free = |row: &Row| match row.geometry.rule {
-            RowRule::AtLeastZero => row.impulse <= 0.0,
-            _ => false,
-        };
-        for _ in 0..MAX_ITERATIONS {
-            self.residual.clear();
-            self.residual.extend(self.rows.iter().zip(&self.diagonal).map(
-                |(row, inverse_mass)| {
-                    let speed = row.speed(&self.bodies);
-                    match row.geometry.rule {
-                        RowRule::Speed { target, .. } => speed - target,
-                        RowRule::Spring { spring, .. } => {
-                            let kick = spring.step(h).kicks[1];
-                            speed
-                                + kick.compliance * inverse_mass * row.relaxation
-                                + kick.bias * row.geometry.error
-                        }
-                        _ => speed,
-                    }
-                },
-            ));
-            let mut changed = false;
-            for (row, residual) in self.rows.iter_mut().zip(&self.residual) {
-                if is_free(row) {
-                    row.active = false;
-                } else {
-                    let total = row.impulse + row.relaxation;
-                    changed |= row.update_active(*residual, total, row.bounds(h));
-                }
-            }
-            self.solve_linear(|row| match row.geometry.rule {
-                RowRule::Spring { spring, .. } => spring.step(h).kicks[1].compliance,
-                _ => 0.0,
-            });
-            for (row, change) in self.rows.iter_mut().zip(&self.residual) {
-                let [least, most] = row.bounds(h);
-                if row.active && change.is_finite() {
-                    let total = row.impulse + row.relaxation;
-                    let change = (total + change).clamp(least, most) - total;
-                    row.relaxation += change;
-                    row.apply(change, &mut self.bodies);
-                }
-            }
-            if !changed {
-                break;
-            }
-        }
-    }
-
     /// Stores impulses for the next substep, and the loads of this one.
-    fn store(&mut self, h: f64) {
+    pub(super) fn store(&mut self, h: f64) {
         for index in 0..self.joints.len() {
             let range = self.rows_of(index);
             let arm = self.frames(&self.joints[index], |body| body.pose).arms[1];

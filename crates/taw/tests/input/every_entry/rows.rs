@@ -139,8 +139,7 @@ pub fn rows<S: Scalar>() -> Vec<Row<S>> {
     rows.extend(worlds());
     rows.extend(materials());
     rows.extend(swarms());
-    rows.extend(walls());
-    rows.extend(super::joint_rows::joints());
+    rows.extend(walls().into_iter().chain(super::joint_rows::joints()));
     rows.extend(constructors());
     rows.extend(planes_and_frames());
     rows
