@@ -17,7 +17,7 @@ pub enum StopReason {
     /// Its position, rotation or velocity overflowed. No other marble is affected.
     NotFinite,
     /// It still had events when the budget of the step was spent, by
-    /// [`Response::EventDriven`]: thousands of collisions within a step, as between walls that close.
+    /// [`Response::EventDriven`](crate::response::Response::EventDriven): thousands of collisions within a step, as between walls that close.
     EventBudget,
 }
 
