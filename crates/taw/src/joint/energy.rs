@@ -2,8 +2,7 @@
 
 use cgmath::InnerSpace;
 
-use super::body::JointBody;
-use super::body::JointRow;
+use super::body::{JointBody, JointRow};
 use super::rows::RowRule;
 use super::system::JointSystem;
 use crate::handle::NO_ROW;
@@ -48,7 +47,8 @@ impl JointSystem {
     }
 
     /// Takes back kinetic energy that groups have gained: positions at the end of a substep are right to second
-    /// order, and energy swings by a small part. More is what the substeps do not follow.
+    /// order, and energy swings by a small part. More is what the substeps do not follow. All speeds of the group
+    /// shrink alike, so that its joints still hold; a free one loses momentum with them.
     pub(super) fn limit_gain(&mut self) {
         let mut energy = vec![0.0; self.joints.len()];
         for (body, group) in self.bodies.iter().zip(&self.group_of_body) {

@@ -35,6 +35,10 @@ pub(crate) struct JointState<S> {
 /// solved on one thread, which is exact but costs more the more joints are connected in a net: a chain takes a
 /// time in proportion to its length, a sheet more, and many joints of one marble the cube of their number.
 ///
+/// Machines that move faster than substeps can follow, or whose own marbles press each other, may open for a while
+/// or gain energy: of 300 random ones, 3 that do not collide with themselves, and 16 that do, gain more than 5 % or
+/// open by more than a millimetre (`cargo test -p taw --test joint random`).
+///
 /// ```
 /// use taw::joint::{Joint, JointEnd, JointKind};
 /// use taw::prelude::*;

@@ -269,8 +269,8 @@ impl JointSystem {
         }
     }
 
-    /// Finds the impulse of each joint's force in this substep, if it is larger than known; between anchors that are apart, only what pulls
-    /// them together counts.
+    /// Finds the impulse of each joint's force in this substep, if it is larger than known. Between anchors that
+    /// are apart, only what pulls them together counts.
     pub(super) fn find_pulls(&mut self) {
         for index in 0..self.joints.len() {
             let rows = &self.rows[self.rows_of(index)];
