@@ -3,7 +3,7 @@ use std::fmt;
 use cgmath::{Array, InnerSpace};
 
 use crate::frame::NodeId;
-use crate::handle::{BallId, JointId, MarbleId, SensorId, WallId};
+use crate::handle::{BallId, BodyId, JointId, MarbleId, SensorId, WallId};
 use crate::math::{Point3, Quat, Scalar, Vec3, length};
 
 /// Reason why an input was rejected. A function that returns one has changed nothing.
@@ -80,12 +80,15 @@ pub enum Error {
     /// No joint has this handle: it was removed, broke, or belongs to another world.
     #[error("no joint has the handle {0:?}")]
     NoSuchJoint(JointId),
-    /// A joint holds no marble.
-    #[error("none of the two ends of a joint is a marble")]
-    NoMarble,
-    /// Both ends of a joint are one marble.
-    #[error("a joint joins the marble {0:?} to itself")]
-    JoinedToItself(MarbleId),
+    /// No body has this handle: it was removed, or belongs to another world.
+    #[error("no body has the handle {0:?}")]
+    NoSuchBody(BodyId),
+    /// A joint holds nothing that moves.
+    #[error("both ends of a joint are places in the world")]
+    NothingJoined,
+    /// Both ends of a joint are one marble or one body.
+    #[error("both ends of a joint are the same marble or body")]
+    JoinedToItself,
     /// No node has this handle: it was removed, or belongs to another tree.
     #[error("no node has the handle {0:?}")]
     NoSuchNode(NodeId),

@@ -18,6 +18,10 @@ pub struct SensorId(pub(crate) Handle);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct JointId(pub(crate) Handle);
 
+/// Stable handle of a rigid body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct BodyId(pub(crate) Handle);
+
 /// Stable handle of a ball of a swarm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct BallId(pub(crate) Handle);

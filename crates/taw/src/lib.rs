@@ -35,6 +35,7 @@
 //! | [`broad`] | who might touch: a grid for marbles |
 //! | [`motion`] | how a thing moves: integrators, forces, masses, rotation |
 //! | `constraint` | the impulse of one contact point, for all methods |
+//! | [`body`] | rigid bodies of any shape, and their contacts |
 //! | [`response`] | what a touch does |
 //! | [`swarm`] | balls in bulk: few features, a million of them |
 //! | [`world`] | the state in columns, the [`Model`](world::Model), the step |
@@ -54,6 +55,7 @@
 
 #![cfg_attr(not(test), warn(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod body;
 pub mod broad;
 mod constraint;
 pub mod contact;

@@ -18,6 +18,7 @@ const ORDER: [&str; 15] = [
     "broad",
     "motion",
     "constraint",
+    "body",
     "joint",
     "response",
     "swarm",

@@ -18,12 +18,20 @@ pub struct SubShapeResult<T> {
 #[must_use]
 pub fn sub_shapes<S: Scalar>(shape: &Shape<S>) -> Vec<&dyn Convex<S>> {
     match shape {
-        Shape::Sphere(sphere) => vec![sphere],
-        Shape::Aabb(aabb) => vec![aabb],
-        Shape::Obb(obb) => vec![obb],
-        Shape::Capsule(capsule) => vec![capsule],
-        Shape::Hull(hull) => vec![hull],
         Shape::Compound(compound) => compound.parts().iter().flat_map(sub_shapes).collect(),
+        simple => as_convex(simple).into_iter().collect(),
+    }
+}
+
+/// Convex shape of a part; none of a compound.
+pub(crate) fn as_convex<S: Scalar>(shape: &Shape<S>) -> Option<&dyn Convex<S>> {
+    match shape {
+        Shape::Sphere(sphere) => Some(sphere),
+        Shape::Aabb(aabb) => Some(aabb),
+        Shape::Obb(obb) => Some(obb),
+        Shape::Capsule(capsule) => Some(capsule),
+        Shape::Hull(hull) => Some(hull),
+        Shape::Compound(_) => None,
     }
 }
 

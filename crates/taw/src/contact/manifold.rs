@@ -1,4 +1,4 @@
-use cgmath::InnerSpace;
+use cgmath::{EuclideanSpace, InnerSpace};
 
 use smallvec::SmallVec;
 
@@ -6,6 +6,7 @@ use super::brute_force::{Axis, AxisSource};
 use super::closest::{ClosestPoints, LocalClosestPoints, closest_points, core_distance};
 use super::core::{Convex, Core, CoreKind, IndexedVertex, PARALLEL_SIN, Polygon};
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, normalize_and_length};
+use crate::shape::Plane;
 
 /// Contact manifold: a point, the ends of a segment, or up to four vertices of a polygon.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,14 +90,50 @@ pub fn manifold<S: Scalar>(
         points.push(ContactPoint { on_a, on_b, distance, feature });
     }
     reduce(&mut points, normal);
-    let point = |local: Vec3<f64>| cast_point(origin + local);
+    let points = public_points(&points, normal, [x.radius, y.radius], origin);
+    Manifold { normal: cast_vector(normal), points }
+}
+
+/// Contact manifold of a half-space and a convex shape at most `margin` metres apart.
+#[must_use]
+pub fn manifold_of_plane<S: Scalar>(
+    plane: &Plane<S>,
+    shape: &(impl Convex<S> + ?Sized),
+    margin: S,
+) -> Manifold<S> {
+    let origin = cast_point::<S, f64>(shape.center());
+    let (core, normal) = (shape.core(origin), cast_vector::<S, f64>(plane.normal()));
+    let offset = plane.offset().as_f64() - normal.dot(origin.to_vec());
+    let height = |vertex: Vec3<f64>| normal.dot(vertex) - offset;
+    let mut points: ContactPoints = core
+        .facing(-normal)
+        .into_iter()
+        .map(|(on_b, feature)| {
+            let distance = height(on_b);
+            ContactPoint { on_a: on_b - normal * distance, on_b, distance, feature }
+        })
+        .filter(|point| point.distance - core.radius <= margin.as_f64())
+        .collect();
+    reduce(&mut points, normal);
+    let points = public_points(&points, normal, [0.0, core.radius], origin);
+    Manifold { normal: plane.normal(), points }
+}
+
+/// Points on surfaces, from those on cores with these radii.
+fn public_points<S: Scalar>(
+    points: &ContactPoints,
+    normal: Vec3<f64>,
+    radii: [f64; 2],
+    origin: Point3<f64>,
+) -> Points<S> {
+    let place = |local: Vec3<f64>| cast_point(origin + local);
     let public = points.iter().map(|p| ManifoldPoint {
-        on_a: point(p.on_a + normal * x.radius),
-        on_b: point(p.on_b - normal * y.radius),
-        distance: S::from_f64(p.distance - x.radius - y.radius),
+        on_a: place(p.on_a + normal * radii[0]),
+        on_b: place(p.on_b - normal * radii[1]),
+        distance: S::from_f64(p.distance - radii[0] - radii[1]),
         feature: p.feature,
     });
-    Manifold { normal: cast_vector(normal), points: public.collect() }
+    public.collect()
 }
 
 /// Mean of the deepest contact points of two cores, without their radii, along the normal of a

@@ -92,6 +92,24 @@ pub struct ContactMaterial<S> {
     pub compliance: Compliance<S>,
 }
 
+impl<S: Scalar> ContactMaterial<S> {
+    /// Converts to another scalar.
+    pub(crate) fn cast<T: Scalar>(self) -> ContactMaterial<T> {
+        let number = |x: S| T::from_f64(x.as_f64());
+        ContactMaterial {
+            restitution: number(self.restitution),
+            friction: number(self.friction),
+            tangential_restitution: number(self.tangential_restitution),
+            rolling_resistance: number(self.rolling_resistance),
+            spinning_resistance: number(self.spinning_resistance),
+            compliance: Compliance {
+                normal: number(self.compliance.normal),
+                tangent: number(self.compliance.tangent),
+            },
+        }
+    }
+}
+
 impl<S: Scalar> Default for ContactMaterial<S> {
     /// Contact of two bodies of the default [`Material`].
     fn default() -> Self {

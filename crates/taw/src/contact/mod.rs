@@ -8,7 +8,7 @@
 //! |---|---|---|---|---|
 //! | two spheres | [`touching_sphere_sphere`] | [`mtv_sphere_sphere`], [`closest_points`] | [`manifold`] | [`time_of_impact_sphere_sphere`] |
 //! | sphere and half-space | [`touching_sphere_plane`] | [`mtv_sphere_plane`], [`closest_points_of_plane`] | | |
-//! | any bounded shape and half-space | [`ClosestPoints::touching`] | [`closest_points_of_plane`] | | |
+//! | any bounded shape and half-space | [`ClosestPoints::touching`] | [`closest_points_of_plane`] | [`manifold_of_plane`] | |
 //! | any two of sphere, box, capsule and hull | [`ClosestPoints::touching`] | [`closest_points`] | [`manifold`] | [`shape_cast`] |
 //! | two of these, rotating as they move | | | | [`time_of_impact`] |
 //! | any two shapes, compounds included | [`ClosestPoints::touching`] | [`closest_points_of_shapes`] | [`manifolds_of_shapes`] | [`shape_cast_of_shapes`] |
@@ -60,12 +60,13 @@ pub use brute_force::Features;
 pub use closest::{
     ClosestPoints, closest_points, closest_points_brute_force, closest_points_of_plane,
 };
+pub(crate) use compound::as_convex;
 pub use compound::{
     SubShapeResult, closest_points_of_shapes, manifolds_of_shapes, shape_cast_of_shapes, sub_shapes,
 };
 pub use contacts::{Contact, Contacts, touch_goes_on};
 pub use core::{Convex, Core};
-pub use manifold::{Manifold, ManifoldPoint, Points, manifold};
+pub use manifold::{Manifold, ManifoldPoint, Points, manifold, manifold_of_plane};
 pub use material::{Combine, Compliance, ContactMaterial, Elasticity, Material};
 pub use ray_cast::{RayCast, RayHit};
 pub use shape_cast::{ShapeCastHit, shape_cast};

@@ -1,25 +1,36 @@
 //! Bodies and rows while joints are solved.
 
-use cgmath::{InnerSpace, Zero};
+use cgmath::{InnerSpace, Matrix, SquareMatrix, Zero};
 
 use super::rows::{RowGeometry, RowRule};
+use crate::body::turned_freely;
 use crate::frame::Pose;
-use crate::handle::NO_ROW;
-use crate::math::Vec3;
+use crate::math::{Mat3, Vec3};
 use crate::motion::integrate_rotation;
 
 /// Largest error that a substep removes, in units of the smaller radius, and in rad.
 const MAX_CORRECTION: f64 = 1.0;
 
-/// Body while joints are solved: a ball, or a place in the world.
+/// What a joint holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum JointOwner {
+    /// Place in the world.
+    Place,
+    /// Ball, by its slot.
+    Ball(u32),
+    /// Rigid body, by its index in the solver.
+    Rigid(u32),
+}
+
+/// Body while joints are solved.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JointBody {
-    /// Slot of a ball; [`NO_ROW`] for a place in the world.
-    pub slot: u32,
-    /// Inverse mass in 1/kg, and inverse moment of inertia in 1/(kg m²); zero for what nothing moves or turns.
+    pub owner: JointOwner,
+    /// Inverse mass in 1/kg, and inverse principal moments of inertia in 1/(kg m²); zero for what nothing moves or
+    /// turns.
     pub inverse_mass: f64,
-    pub inverse_inertia: f64,
-    /// Center and rotation.
+    pub inverse_moments: Vec3<f64>,
+    /// Center of mass, and rotation of the principal axes.
     pub pose: Pose<f64>,
     /// Velocity in m/s, and angular velocity in rad/s.
     pub velocity: Vec3<f64>,
@@ -28,8 +39,28 @@ pub(crate) struct JointBody {
     pub fall: Vec3<f64>,
     /// Radius in metres; infinite for a place.
     pub radius: f64,
-    /// Inverse mass and inverse moment of inertia by which this pass solves.
-    pub inverse: [f64; 2],
+    /// Inverse inertia by which this pass solves.
+    pub inverse: InverseInertia,
+}
+
+/// Inverse mass, inverse principal moments of inertia, and their tensor in the world.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct InverseInertia {
+    pub mass: f64,
+    pub moments: Vec3<f64>,
+    pub tensor: Mat3<f64>,
+}
+
+impl InverseInertia {
+    /// Largest inverse moment.
+    pub fn largest_moment(&self) -> f64 {
+        largest(self.moments)
+    }
+}
+
+/// Largest component of a vector.
+fn largest(v: Vec3<f64>) -> f64 {
+    v.x.max(v.y).max(v.z)
 }
 
 /// Row while it is solved.
@@ -48,31 +79,75 @@ impl JointBody {
     /// Place in the world that does not move.
     pub fn place(pose: Pose<f64>) -> Self {
         Self {
-            slot: NO_ROW,
+            owner: JointOwner::Place,
             inverse_mass: 0.0,
-            inverse_inertia: 0.0,
+            inverse_moments: Vec3::zero(),
             pose,
             velocity: Vec3::zero(),
             spin: Vec3::zero(),
             fall: Vec3::zero(),
             radius: f64::INFINITY,
-            inverse: [0.0; 2],
+            inverse: InverseInertia { mass: 0.0, moments: Vec3::zero(), tensor: Mat3::zero() },
         }
+    }
+
+    /// Returns true for a place in the world.
+    pub fn is_place(&self) -> bool {
+        self.owner == JointOwner::Place
+    }
+
+    /// Returns true if all its moments are one, as a ball's.
+    fn is_round(&self) -> bool {
+        let Vec3 { x, y, z } = self.inverse_moments;
+        x == y && y == z
+    }
+
+    /// Largest inverse moment of inertia; zero for what does not turn.
+    pub fn largest_moment(&self) -> f64 {
+        largest(self.inverse_moments)
+    }
+
+    /// Sets the inertia by which a pass solves: at least this mass in kg and this moment in kg m².
+    pub fn set_inertia(&mut self, [mass, inertia]: [f64; 2]) {
+        let moments = self.inverse_moments.map(|inverse| inverse.min(1.0 / inertia));
+        let tensor = if self.is_round() {
+            Mat3::from_value(moments.x)
+        } else {
+            let axes = Mat3::from(self.pose.rotation);
+            axes * Mat3::from_diagonal(moments) * axes.transpose()
+        };
+        let mass = self.inverse_mass.min(1.0 / mass);
+        self.inverse = InverseInertia { mass, moments, tensor };
+    }
+
+    /// Part of its inertia that only forces need; NaN for what does not turn.
+    pub fn excess_inertia(&self) -> f64 {
+        let excess = self.inverse.moments.zip(self.inverse_moments, |now, own| 1.0 - now / own);
+        excess.x.max(excess.y).max(excess.z)
     }
 
     /// Pose at the end of a substep of `h` seconds.
     pub fn pose_after(&self, h: f64) -> Pose<f64> {
-        Pose {
-            translation: self.pose.translation + self.velocity * h + self.fall,
-            rotation: integrate_rotation(self.pose.rotation, self.spin, h),
-        }
+        let translation = self.pose.translation + self.velocity * h + self.fall;
+        let rotation = if self.is_round() {
+            integrate_rotation(self.pose.rotation, self.spin, h)
+        } else {
+            let moments = self.inverse_moments.map(|inverse| 1.0 / inverse);
+            turned_freely(self.pose.rotation, self.spin, moments, h)
+        };
+        Pose { rotation, translation }
     }
 
     /// Kinetic energy, in J.
     pub fn energy(&self) -> f64 {
         let of = |squared: f64, inverse: f64| if inverse > 0.0 { squared / inverse } else { 0.0 };
         let moving = of(self.velocity.magnitude2(), self.inverse_mass);
-        (moving + of(self.spin.magnitude2(), self.inverse_inertia)) * 0.5
+        if self.is_round() {
+            return (moving + of(self.spin.magnitude2(), self.inverse_moments.x)) * 0.5;
+        }
+        let spin = self.pose.inverse_transform_vector(self.spin);
+        let turning = (0..3).map(|axis| of(spin[axis] * spin[axis], self.inverse_moments[axis]));
+        (moving + turning.sum::<f64>()) * 0.5
     }
 
     /// Displacement of its center in a substep of `h` seconds, and angle by which it turns.
@@ -81,9 +156,8 @@ impl JointBody {
     }
 
     pub fn apply(&mut self, linear: Vec3<f64>, angular: Vec3<f64>) {
-        let [mass, inertia] = self.inverse;
-        self.velocity += linear * mass;
-        self.spin += angular * inertia;
+        self.velocity += linear * self.inverse.mass;
+        self.spin += self.inverse.tensor * angular;
     }
 }
 
@@ -134,7 +208,7 @@ impl JointRow {
             for its in (0..2).filter(|its| other.bodies[*its] == self.bodies[end]) {
                 let body = &bodies[self.bodies[end] as usize];
                 let ([a, b], [c, d]) = (self.jacobian(end), other.jacobian(its));
-                sum += a.dot(c) * body.inverse[0] + b.dot(d) * body.inverse[1];
+                sum += a.dot(c) * body.inverse.mass + b.dot(body.inverse.tensor * d);
             }
         }
         sum

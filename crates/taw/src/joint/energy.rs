@@ -5,7 +5,6 @@ use cgmath::InnerSpace;
 use super::body::{JointBody, JointRow};
 use super::rows::RowRule;
 use super::system::JointSystem;
-use crate::handle::NO_ROW;
 
 /// Kinetic energy that joints may have made, over all of a group.
 const MAX_GAIN: f64 = 0.02;
@@ -34,7 +33,7 @@ impl JointSystem {
                     let [linear, angular] = row.jacobian(end);
                     let drives = |inverse: f64, power: f64| if inverse > 0.0 { 0.0 } else { power };
                     drives(body.inverse_mass, linear.dot(body.velocity))
-                        + drives(body.inverse_inertia, angular.dot(body.spin))
+                        + drives(body.largest_moment(), angular.dot(body.spin))
                 };
                 let places = of_place(0) + of_place(1);
                 let drives = match row.geometry.rule {
@@ -59,7 +58,7 @@ impl JointSystem {
         }
         for (body, group) in self.bodies.iter_mut().zip(&self.group_of_body) {
             let (gain, energy) = (self.joints[*group].gain, energy[*group]);
-            if gain > energy * MAX_GAIN && body.slot != NO_ROW {
+            if gain > energy * MAX_GAIN && !body.is_place() {
                 let scale = (1.0 - gain / energy).max(0.0).sqrt();
                 body.velocity *= scale;
                 body.spin *= scale;

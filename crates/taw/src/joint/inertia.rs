@@ -14,9 +14,8 @@ impl JointSystem {
     /// Gives bodies the inertia that their joints' forces need.
     pub(super) fn stiffen(&mut self, h: f64) {
         let needs = self.needed_inertia(h);
-        for (body, [mass, inertia]) in self.bodies.iter_mut().zip(needs) {
-            body.inverse =
-                [body.inverse_mass.min(1.0 / mass), body.inverse_inertia.min(1.0 / inertia)];
+        for (body, needs) in self.bodies.iter_mut().zip(needs) {
+            body.set_inertia(needs);
         }
     }
 
@@ -51,10 +50,9 @@ impl JointSystem {
         };
         for joint in self.joints.iter().filter(bends) {
             let pair = joint.bodies.map(|body| self.bodies[body as usize]);
-            let excess = pair.map(|body| 1.0 - body.inverse[1] / body.inverse_inertia);
-            // NaN for a place, or a rotation that is locked.
+            let excess = pair.map(|body| body.excess_inertia());
             let excess = excess[0].max(excess[1]).max(1.0 - self.resolved(joint, h));
-            if pair.iter().any(|body| body.inverse_inertia <= 0.0) || excess <= 0.0 {
+            if pair.iter().any(|body| body.largest_moment() <= 0.0) || excess <= 0.0 {
                 continue;
             }
             let mut turn = pair[1].spin - pair[0].spin;
@@ -62,7 +60,8 @@ impl JointSystem {
                 let axis = self.frames(joint, |body| body.pose).frames[0].rotation * Vec3::unit_z();
                 turn -= axis * axis.dot(turn);
             }
-            let impulse = turn * (BENDING * excess / (pair[0].inverse[1] + pair[1].inverse[1]));
+            let give = pair[0].inverse.largest_moment() + pair[1].inverse.largest_moment();
+            let impulse = turn * (BENDING * excess / give);
             self.bodies[joint.bodies[0] as usize].apply(Vec3::zero(), impulse);
             self.bodies[joint.bodies[1] as usize].apply(Vec3::zero(), -impulse);
         }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::{Joint, JointEnd, JointId, JointKind, rows};
 use crate::Error;
 use crate::frame::Pose;
-use crate::handle::{Handles, MarbleId};
+use crate::handle::Handles;
 use crate::math::Scalar;
 use crate::uncompared::Uncompared;
 
@@ -73,11 +73,11 @@ pub struct Joints<S> {
 }
 
 impl<S: Scalar> Joints<S> {
-    /// Adds a joint. One of marbles that are not there is taken out in the next step.
+    /// Adds a joint. One of marbles or bodies that are not there is taken out in the next step.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] or [`Error::NotUnit`] for a frame; [`Error::NoMarble`] for two places in the world;
-    /// [`Error::JoinedToItself`] for a marble joined to itself; [`Error::OutOfRange`], [`Error::NotPositive`] or
+    /// [`Error::NotFinite`] or [`Error::NotUnit`] for a frame; [`Error::NothingJoined`] for two places in the
+    /// world; [`Error::JoinedToItself`] for a marble or body joined to itself; [`Error::OutOfRange`], [`Error::NotPositive`] or
     /// [`Error::NotFinite`] for a number of its kind; [`Error::Full`] at 2³² − 1 joints.
     pub fn insert(&mut self, joint: Joint<S>) -> Result<JointId, Error> {
         let joint = joint.validated()?;
@@ -98,13 +98,12 @@ impl<S: Scalar> Joints<S> {
         let state = &mut self.states[row];
         let before = std::mem::replace(&mut state.joint, joint);
         for (at, frame) in state.frames_before.iter_mut().enumerate() {
-            let was_world = matches!(before.ends[at], JointEnd::World { .. });
-            if !was_world || matches!(joint.ends[at], JointEnd::Marble { .. }) {
+            if !before.ends[at].is_world() || !joint.ends[at].is_world() {
                 *frame = joint.ends[at].frame();
             }
         }
-        let same_bodies = before.ends.map(|end| end.marble_id())
-            == joint.ends.map(|end| end.marble_id())
+        let held = |joint: &Joint<S>| joint.ends.map(|end| (end.marble_id(), end.body_id()));
+        let same_bodies = held(&before) == held(&joint)
             && before.collide_connected == joint.collide_connected;
         let same_rows = discriminant(&before.kind) == discriminant(&joint.kind)
             && rows::count(&before.kind) == rows::count(&joint.kind);
@@ -185,12 +184,9 @@ impl<S: Scalar> Joints<S> {
         }
     }
 
-    /// Takes out joints of marbles that are gone.
-    pub(crate) fn remove_loose(&mut self, is_there: impl Fn(MarbleId) -> bool) {
-        self.remove_where(|state| {
-            let marbles = state.joint.ends.iter().filter_map(JointEnd::marble_id);
-            marbles.into_iter().any(|marble| !is_there(marble))
-        });
+    /// Takes out joints of what is gone.
+    pub(crate) fn remove_loose(&mut self, is_there: impl Fn(&JointEnd<S>) -> bool) {
+        self.remove_where(|state| state.joint.ends.iter().any(|end| !is_there(end)));
     }
 
     /// Takes out joints whose load was too much, and remembers which.

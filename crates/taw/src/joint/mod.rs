@@ -1,5 +1,4 @@
-//! Joints between marbles, and between a marble and a place in the world: what a joint is, its rows, and their
-//! solution.
+//! Joints between marbles, rigid bodies and places in the world: what a joint is, its rows, and their solution.
 //!
 //! Each kind of joint is a list of rows: a position error `C`, and its Jacobian `J`, by which velocities of the
 //! two ends change it (`rows.rs`). All rows of a world are solved at once, as the linear system
@@ -26,9 +25,9 @@ pub use list::Joints;
 use crate::Error;
 use crate::error::{finite, positive, within};
 use crate::frame::Pose;
-use crate::handle::MarbleId;
+use crate::handle::{BodyId, MarbleId};
 use crate::math::{Point3, Quat, Scalar, Vec3};
-pub(crate) use body::JointBody;
+pub(crate) use body::{JointBody, JointOwner};
 pub(crate) use system::{JointSystem, SystemJoint};
 
 /// End of a joint.
@@ -39,6 +38,13 @@ pub enum JointEnd<S> {
         /// The marble.
         marble: MarbleId,
         /// Frame of the joint in that of the marble.
+        frame: Pose<S>,
+    },
+    /// Rigid body, and the frame of the joint in its frame.
+    Body {
+        /// The body.
+        body: BodyId,
+        /// Frame of the joint in that of the body.
         frame: Pose<S>,
     },
     /// Place in the world. One that is [set](Joints::set) elsewhere moves there within the next step.
@@ -55,6 +61,12 @@ impl<S: Scalar> JointEnd<S> {
         Self::Marble { marble, frame: Pose { translation: anchor, ..Pose::identity() } }
     }
 
+    /// Anchor on a rigid body, in its frame, in metres, with its axes.
+    #[must_use]
+    pub fn body(body: BodyId, anchor: Vec3<S>) -> Self {
+        Self::Body { body, frame: Pose { translation: anchor, ..Pose::identity() } }
+    }
+
     /// Anchor in the world, with the axes of the world.
     #[must_use]
     pub fn world(anchor: Point3<S>) -> Self {
@@ -65,16 +77,43 @@ impl<S: Scalar> JointEnd<S> {
     /// Turns its frame.
     #[must_use]
     pub fn with_rotation(mut self, rotation: Quat<S>) -> Self {
-        let (Self::Marble { frame, .. } | Self::World { frame }) = &mut self;
-        frame.rotation = rotation;
+        self.frame_mut().rotation = rotation;
         self
     }
 
     /// Frame of the joint.
     #[must_use]
     pub fn frame(&self) -> Pose<S> {
-        let (Self::Marble { frame, .. } | Self::World { frame }) = self;
+        let (Self::Marble { frame, .. } | Self::Body { frame, .. } | Self::World { frame }) = self;
         *frame
+    }
+
+    fn frame_mut(&mut self) -> &mut Pose<S> {
+        let (Self::Marble { frame, .. } | Self::Body { frame, .. } | Self::World { frame }) = self;
+        frame
+    }
+
+    /// The rigid body, if it is one.
+    #[must_use]
+    pub fn body_id(&self) -> Option<BodyId> {
+        match self {
+            Self::Body { body, .. } => Some(*body),
+            Self::Marble { .. } | Self::World { .. } => None,
+        }
+    }
+
+    /// Returns true for a place in the world.
+    pub(crate) fn is_world(&self) -> bool {
+        matches!(self, Self::World { .. })
+    }
+
+    /// Returns true if it holds what the other one holds.
+    fn holds_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Marble { marble: a, .. }, Self::Marble { marble: b, .. }) => a == b,
+            (Self::Body { body: a, .. }, Self::Body { body: b, .. }) => a == b,
+            _ => false,
+        }
     }
 
     /// The marble, if it is one.
@@ -82,7 +121,7 @@ impl<S: Scalar> JointEnd<S> {
     pub fn marble_id(&self) -> Option<MarbleId> {
         match self {
             Self::Marble { marble, .. } => Some(*marble),
-            Self::World { .. } => None,
+            Self::Body { .. } | Self::World { .. } => None,
         }
     }
 }
@@ -170,14 +209,14 @@ pub enum JointKind<S> {
     },
 }
 
-/// Joint of two marbles, or of a marble and a place in the world.
+/// Joint of two marbles or rigid bodies, or of one and a place in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint<S> {
     /// Its ends.
     pub ends: [JointEnd<S>; 2],
     /// Motions that it leaves free.
     pub kind: JointKind<S>,
-    /// True if two marbles that it joins collide with each other.
+    /// True if the two that it joins collide with each other.
     pub collide_connected: bool,
     /// Force in N beyond which it breaks; infinite for never. Anchors that are apart when the joint is made are
     /// brought together within few substeps, by a force that may be large.
@@ -187,7 +226,7 @@ pub struct Joint<S> {
 }
 
 impl<S: Scalar> Joint<S> {
-    /// Joint that never breaks, and whose marbles do not collide with each other.
+    /// Joint that never breaks, and whose ends do not collide with each other.
     #[must_use]
     pub fn new(kind: JointKind<S>, ends: [JointEnd<S>; 2]) -> Self {
         let never = S::infinity();
@@ -197,13 +236,14 @@ impl<S: Scalar> Joint<S> {
     /// Validates all numbers.
     fn validated(mut self) -> Result<Self, Error> {
         for end in &mut self.ends {
-            let (JointEnd::Marble { frame, .. } | JointEnd::World { frame }) = end;
-            *frame = frame.validated()?;
+            *end.frame_mut() = end.frame().validated()?;
         }
-        match self.ends.map(|end| end.marble_id()) {
-            [None, None] => return Err(Error::NoMarble),
-            [Some(a), Some(b)] if a == b => return Err(Error::JoinedToItself(a)),
-            _ => {}
+        let [a, b] = self.ends;
+        if a.is_world() && b.is_world() {
+            return Err(Error::NothingJoined);
+        }
+        if a.holds_same(&b) {
+            return Err(Error::JoinedToItself);
         }
         for (field, value) in
             [("breaking_force", self.breaking_force), ("breaking_torque", self.breaking_torque)]

@@ -6,12 +6,11 @@ use std::f64::consts::TAU;
 use cgmath::{InnerSpace, Zero};
 
 use super::JointKind;
-use super::body::{JointBody, JointRow};
+use super::body::{JointBody, JointOwner, JointRow};
 use super::elimination::elimination_order;
 use super::rows::{JointFrames, MAX_ROWS, RowRule, count};
 use super::sparse_ldl::SparseLdl;
 use crate::frame::Pose;
-use crate::handle::NO_ROW;
 use crate::math::{Vec3, normalize_and_length};
 
 /// Number of times that positions at the end of a substep are looked at: the error of each is the square of the
@@ -106,7 +105,7 @@ impl JointSystem {
         self.rows.clear();
         let mut of_body: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for (index, joint) in (0..).zip(&self.joints) {
-            for body in joint.bodies.iter().filter(|body| self.is_ball(**body)) {
+            for body in joint.bodies.iter().filter(|body| self.moves(**body)) {
                 of_body.entry(*body).or_default().push(index);
             }
         }
@@ -160,8 +159,8 @@ impl JointSystem {
         self.joints.is_empty()
     }
 
-    fn is_ball(&self, body: u32) -> bool {
-        self.bodies[body as usize].slot != NO_ROW
+    fn moves(&self, body: u32) -> bool {
+        !self.bodies[body as usize].is_place()
     }
 
     pub(super) fn rows_of(&self, joint: usize) -> std::ops::Range<usize> {
@@ -225,7 +224,8 @@ impl JointSystem {
             self.find_pulls();
             let needs = self.needed_inertia(h);
             let too_light = |(body, [mass, inertia]): (&JointBody, &[f64; 2])| {
-                body.inverse[0] * mass > MAX_EXCESS || body.inverse[1] * inertia > MAX_EXCESS
+                body.inverse.mass * mass > MAX_EXCESS
+                    || body.inverse.largest_moment() * inertia > MAX_EXCESS
             };
             let leapt = self.find_leaps(&start, h);
             if !leapt && !self.bodies.iter().zip(&needs).any(too_light) {
@@ -250,7 +250,7 @@ impl JointSystem {
         {
             let change = (body.velocity - velocity).magnitude();
             let most = MAX_LEAP * (fastest[*group] + arm(body) / h);
-            if body.slot != NO_ROW && (change > most || change.is_nan()) {
+            if !body.is_place() && (change > most || change.is_nan()) {
                 any |= !std::mem::replace(&mut self.joints[*group].plain, true);
             }
         }
@@ -407,7 +407,7 @@ impl JointSystem {
         self.matrix.solve(&mut self.residual);
     }
 
-    /// Moves on by `h` seconds; centers of balls are moved by others.
+    /// Moves on by `h` seconds; rigid bodies and centers of balls are moved by others.
     pub fn advance(&mut self, h: f64) {
         for joint in &mut self.joints {
             if let JointKind::Gear { .. } = joint.kind {
@@ -416,9 +416,10 @@ impl JointSystem {
         }
         for body in &mut self.bodies {
             let after = body.pose_after(h);
-            body.pose.rotation = after.rotation;
-            if body.slot == NO_ROW {
-                body.pose = after;
+            match body.owner {
+                JointOwner::Place => body.pose = after,
+                JointOwner::Ball(_) => body.pose.rotation = after.rotation,
+                JointOwner::Rigid(_) => {}
             }
         }
     }

@@ -2,9 +2,7 @@ use crate::Error;
 use crate::error::{positive, within};
 use crate::math::Scalar;
 
-/// Moment of inertia of a solid ball of uniform density, over its mass and the square of its radius.
-pub(crate) const BALL_INERTIA: f64 = 0.4;
-/// Reciprocal of [`BALL_INERTIA`].
+/// Mass times the square of the radius of a solid ball, over its moment of inertia.
 pub(crate) const BALL_INVERSE_INERTIA: f64 = 2.5;
 
 /// Mass of a marble.

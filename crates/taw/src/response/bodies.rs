@@ -5,7 +5,6 @@ use cgmath::{InnerSpace, Zero};
 use super::{BallRotation, InverseEffectiveMass};
 use crate::broad::Period;
 use crate::math::{Point3, Scalar, Vec3};
-use crate::motion::BALL_INERTIA;
 
 /// Columns of the bodies that a solver works on; all of one length.
 #[derive(Debug)]
@@ -41,23 +40,6 @@ pub(crate) struct CapsuleInertia<S> {
 }
 
 impl<S: Scalar> CapsuleInertia<S> {
-    /// Axial and transverse moment of inertia per mass, in m²: a cylinder with a hemisphere at each
-    /// end, of uniform density.
-    pub fn unit_inertia(radius: S, half_length: S) -> [S; 2] {
-        let number = S::from_f64;
-        let squared = radius * radius;
-        // Fractions of the mass: the cylinder has volume π r² 2 h, the two hemispheres 4/3 π r³.
-        let cylinder = half_length / (half_length + radius * number(2.0 / 3.0));
-        let ends = S::one() - cylinder;
-        let axial = cylinder * squared * number(0.5) + ends * squared * number(BALL_INERTIA);
-        // The centroid of a hemisphere is 3/8 r from its flat side (Steiner).
-        let cylinder_transverse = squared * number(0.25) + half_length * half_length / number(3.0);
-        let ends_transverse = squared * number(BALL_INERTIA)
-            + half_length * half_length
-            + half_length * radius * number(0.75);
-        [axial, cylinder * cylinder_transverse + ends * ends_transverse]
-    }
-
     /// Twice the energy of a spin per mass, in m²/s²; zero if the rotation is locked.
     pub fn spin_energy(&self, spin: Vec3<S>) -> S {
         let axial = spin.dot(self.axis);

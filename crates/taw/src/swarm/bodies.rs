@@ -20,7 +20,7 @@ use crate::workers::{DisjointSlice, parallel_for};
 
 /// State of a marble as a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Body<S> {
+pub(crate) struct BodyRow<S> {
     pub slot: u32,
     /// Center and radius, in metres.
     pub at: Row<S>,
@@ -177,7 +177,7 @@ impl<S: Scalar> Swarm<S> {
     }
 
     /// Takes over what changed of bodies, and wakes those.
-    pub(crate) fn write_bodies(&mut self, bodies: &[Body<S>]) {
+    pub(crate) fn write_bodies(&mut self, bodies: &[BodyRow<S>]) {
         self.set_layers_of_slots(bodies.iter().map(|body| (body.slot, body.layers)));
         let (mut resized, mut resurfaced, mut lighter) = (false, false, Vec::new());
         for body in bodies {

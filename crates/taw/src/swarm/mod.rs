@@ -56,7 +56,8 @@ mod walls;
 
 pub use crate::handle::BallId;
 pub use crate::math::simd::SimdLevel;
-pub(crate) use bodies::{Body, BodyColumns, MarbleRow, SyncToken, VelocityChange};
+pub(crate) use step::BallView;
+pub(crate) use bodies::{BodyColumns, BodyRow, MarbleRow, SyncToken, VelocityChange};
 pub(crate) use kernels::NearLimits;
 pub(crate) use limits::{LEAST_RADIUS, MAX_COORDINATE};
 pub use model::{Ball, Stage, SwarmModel, Tier};

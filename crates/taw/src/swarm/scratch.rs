@@ -8,6 +8,7 @@ use super::recorded_impulses::RecordedImpulses;
 use super::state::of;
 use super::step::{SavedPlace, WayToWall};
 use super::sweeps::Crowd;
+use crate::body::BodySystem;
 use crate::joint::JointSystem;
 use crate::math::{Row, Scalar, UnionFind};
 use crate::response::Impact;
@@ -71,8 +72,9 @@ pub(super) struct SwarmScratch<S> {
     pub impacts: Vec<Impact<S>>,
     /// Impulse and work on each ball in the step, if they are recorded: by slot.
     pub outside_work: Vec<OutsideWork>,
-    /// Joints of the step.
+    /// Joints and rigid bodies of the step.
     pub joints: JointSystem,
+    pub bodies: BodySystem,
     /// Impulses of contacts in the step, if they are recorded.
     pub recorded_impulses: Option<RecordedImpulses<S>>,
 }
@@ -109,7 +111,8 @@ impl<S: Scalar> SwarmScratch<S> {
             impacts,
             outside_work,
             recorded_impulses,
-            joints: _, // lent for a step
+            joints: _, // lent for a step, as are bodies
+            bodies: _,
             threads: _,
             filters_changed: _,
             contacts_forgotten: _,

@@ -4,12 +4,12 @@ use super::World;
 use crate::math::{Scalar, Vec3, cast_vector};
 use crate::motion::{Motion, Rotation};
 
-/// Energy of a world's marbles in joules, computed in `f64`.
+/// Energy of a world's marbles and rigid bodies in joules, computed in `f64`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
     /// Translational kinetic energy.
     pub kinetic: f64,
-    /// Rotational kinetic energy of marbles with [`Rotation::Dynamic`].
+    /// Rotational kinetic energy of marbles with [`Rotation::Dynamic`], and of rigid bodies.
     pub rotational: f64,
     /// Potential energy in the world's gravity, relative to the origin.
     pub potential: f64,
@@ -24,7 +24,7 @@ impl Energy {
 }
 
 impl<S: Scalar> World<S> {
-    /// Energy of all marbles except those of infinite mass, without force fields and walls.
+    /// Energy of all marbles and rigid bodies except those of infinite mass, without force fields and walls.
     #[must_use]
     pub fn energy(&self) -> Energy {
         let gravity = cast_vector::<S, f64>(self.gravity());
@@ -38,6 +38,13 @@ impl<S: Scalar> World<S> {
                 energy.rotational += 0.5 * mass * self.marbles.rotational_energy(row);
             }
             energy.potential -= mass * scale * gravity.dot(position.to_vec());
+        }
+        for state in self.bodies.states.iter().filter(|state| state.is_dynamic()) {
+            let [kinetic, rotational] = state.solver.energies();
+            energy.kinetic += kinetic;
+            energy.rotational += rotational;
+            let weight = gravity * (state.body.gravity_scale.as_f64() / state.solver.inverse_mass);
+            energy.potential -= weight.dot(state.solver.center().to_vec());
         }
         energy
     }
@@ -53,12 +60,15 @@ impl<S: Scalar> World<S> {
         self.finite_mass_indices().filter_map(excess).sum()
     }
 
-    /// Momentum of all marbles except those of infinite mass, in kg m/s.
+    /// Momentum of all marbles and rigid bodies except those of infinite mass, in kg m/s.
     #[must_use]
     pub fn momentum(&self) -> Vec3<f64> {
         let momentum =
             |row| self.marbles.motion_f64(row).velocity * self.marbles.mass(row).as_f64();
-        self.finite_mass_indices().map(momentum).fold(Vec3::zero(), |sum, p| sum + p)
+        let of_marbles = self.finite_mass_indices().map(momentum);
+        let bodies = self.bodies.states.iter().filter(|state| state.is_dynamic());
+        let of_bodies = bodies.map(|state| state.solver.velocity / state.solver.inverse_mass);
+        of_marbles.chain(of_bodies).fold(Vec3::zero(), |sum, p| sum + p)
     }
 
     fn finite_mass_indices(&self) -> impl Iterator<Item = usize> + '_ {

@@ -8,8 +8,7 @@ use crate::Error;
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Bivector;
 use crate::math::{Point3, Scalar, Vec3, cast_vector};
-use crate::motion::BALL_INERTIA;
-use crate::response::CapsuleInertia;
+use crate::shape::{BALL_INERTIA, capsule_unit_inertia};
 
 const ACCELERATION: [&str; 3] = ["acceleration.x", "acceleration.y", "acceleration.z"];
 const FORCE: [&str; 3] = ["force.x", "force.y", "force.z"];
@@ -204,7 +203,7 @@ impl<S: Scalar> Marbles<S> {
         if half == 0.0 {
             return BALL_INERTIA * (angular_velocity * radius).magnitude2();
         }
-        let [along, across] = CapsuleInertia::unit_inertia(radius, half);
+        let [along, across] = capsule_unit_inertia(radius, half);
         let axis = cast_vector::<S, f64>(self.axis(row)).normalize();
         let about_axis = angular_velocity.dot(axis);
         about_axis * about_axis * along
@@ -224,7 +223,7 @@ impl<S: Scalar> Marbles<S> {
         if half == S::zero() {
             return v * of(S::from_f64(BALL_INERTIA) * radius * radius);
         }
-        let [along, across] = CapsuleInertia::unit_inertia(radius, half).map(of);
+        let [along, across] = capsule_unit_inertia(radius, half).map(of);
         let axis = self.axis(row);
         let part = axis * v.dot(axis);
         part * along + (v - part) * across

@@ -1,7 +1,7 @@
-//! Joints of a world: between marbles as rows, within the third verb of
+//! Joints of a world: between marbles as rows, rigid bodies and places, within the third verb of
 //! [`SoftStep`](crate::response::Response::SoftStep).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use cgmath::{EuclideanSpace, Zero};
 
@@ -9,8 +9,8 @@ use super::soft_step::inverse_mass;
 use super::{ColliderId, MarbleId, World};
 use crate::Error;
 use crate::frame::Pose;
-use crate::handle::NO_ROW;
-use crate::joint::{JointBody, JointEnd, JointSystem, Joints, SystemJoint};
+use crate::handle::BodyId;
+use crate::joint::{JointBody, JointEnd, JointOwner, JointSystem, Joints, SystemJoint};
 use crate::math::{Quat, Scalar, Vec3, cast_vector, normalize_and_length};
 use crate::motion::{BALL_INVERSE_INERTIA, Rotation};
 
@@ -22,13 +22,16 @@ pub(super) struct JointedBodies {
     bodies: Vec<Jointed>,
     /// True for each marble with a joint, by row; empty if there are none.
     pub is_jointed: Vec<bool>,
+    /// Rigid bodies with a joint, in order.
+    pub rigid: Vec<BodyId>,
     system: JointSystem,
 }
 
-/// Body of a joint: a marble, or an end in the world.
+/// Body of a joint.
 #[derive(Clone, Copy, Debug)]
 enum Jointed {
     Marble(MarbleId),
+    Rigid(BodyId),
     /// End in the world of a joint, by index.
     Place {
         joint: usize,
@@ -47,11 +50,15 @@ impl<S: Scalar> World<S> {
 
     /// Finds what joints hold, if that changed: those marbles do not sleep.
     pub(super) fn find_jointed(&mut self) {
-        let removals = self.marbles.removals();
+        let removals = self.marbles.removals() + self.bodies.removals();
         if self.scratch.soft_step.jointed.known == Some([*self.joints.version, removals]) {
             return;
         }
-        self.joints.remove_loose(|id| self.marbles.row(id).is_ok());
+        self.joints.remove_loose(|end| match end {
+            JointEnd::Marble { marble, .. } => self.marbles.row(*marble).is_ok(),
+            JointEnd::Body { body, .. } => self.bodies.row(*body).is_ok(),
+            JointEnd::World { .. } => true,
+        });
         let jointed = &mut self.scratch.soft_step.jointed;
         let had_none = jointed.is_jointed.is_empty();
         let known = Some([*self.joints.version, removals]);
@@ -62,7 +69,7 @@ impl<S: Scalar> World<S> {
         if self.joints.is_empty() {
             return;
         }
-        let mut of_marble = BTreeMap::new();
+        let (mut of_marble, mut of_body) = (BTreeMap::new(), BTreeMap::new());
         let mut joints = Vec::with_capacity(self.joints.len());
         for (joint, state) in self.joints.states.iter().enumerate() {
             let mut bodies = [0; 2];
@@ -70,11 +77,13 @@ impl<S: Scalar> World<S> {
                 let next = jointed.bodies.len() as u32;
                 *body = match state.joint.ends[end] {
                     JointEnd::Marble { marble, .. } => *of_marble.entry(marble).or_insert(next),
+                    JointEnd::Body { body, .. } => *of_body.entry(body).or_insert(next),
                     JointEnd::World { .. } => next,
                 };
                 if *body == next {
                     jointed.bodies.push(match state.joint.ends[end] {
                         JointEnd::Marble { marble, .. } => Jointed::Marble(marble),
+                        JointEnd::Body { body, .. } => Jointed::Rigid(body),
                         JointEnd::World { .. } => Jointed::Place { joint, end },
                     });
                 }
@@ -85,10 +94,15 @@ impl<S: Scalar> World<S> {
         for row in of_marble.keys().filter_map(|id| self.marbles.row(*id).ok()) {
             jointed.is_jointed[row] = true;
         }
+        jointed.rigid = of_body.into_keys().collect();
         let place = |body: &Jointed| {
             let place = JointBody::place(Pose::identity());
-            let slot = if matches!(body, Jointed::Marble(_)) { 0 } else { NO_ROW };
-            JointBody { slot, ..place }
+            let owner = match body {
+                Jointed::Marble(_) => JointOwner::Ball(0),
+                Jointed::Rigid(_) => JointOwner::Rigid(0),
+                Jointed::Place { .. } => JointOwner::Place,
+            };
+            JointBody { owner, ..place }
         };
         let bodies = jointed.bodies.iter().map(place).collect();
         jointed.system.set_structure(bodies, joints);
@@ -104,6 +118,7 @@ impl<S: Scalar> World<S> {
         for (body, is) in system.bodies.iter_mut().zip(&self.scratch.soft_step.jointed.bodies) {
             match *is {
                 Jointed::Marble(id) => self.read_jointed(id, body),
+                Jointed::Rigid(id) => self.read_jointed_body(id, body),
                 Jointed::Place { joint, end } => {
                     let state = &self.joints.states[joint];
                     *body = moving_place(
@@ -120,6 +135,10 @@ impl<S: Scalar> World<S> {
             (joint.pull, joint.gain) = (state.pull, state.gain);
             joint.frames = state.joint.ends.map(|end| match end {
                 JointEnd::Marble { frame, .. } => cast_pose(frame),
+                JointEnd::Body { body, frame } => match self.bodies.row(body) {
+                    Ok(row) => self.bodies.states[row].principal.inverse() * cast_pose(frame),
+                    Err(_) => Pose::identity(), // those were taken out
+                },
                 JointEnd::World { .. } => Pose::identity(),
             });
         }
@@ -134,16 +153,32 @@ impl<S: Scalar> World<S> {
         };
         let marbles = &self.marbles;
         let mass = marbles.mass(row);
-        body.slot = self.scratch.soft_step.slot_of_marble[row];
+        body.owner = JointOwner::Ball(self.scratch.soft_step.slot_of_marble[row]);
         body.inverse_mass = if mass.is_infinite() { 0.0 } else { inverse_mass(mass).as_f64() };
         let turns = marbles.rotation_of(row, self.settings.model.rotation) == Rotation::Dynamic;
         let radius = marbles.radius[row].as_f64();
         body.radius = radius;
-        body.inverse_inertia =
+        let inverse =
             if turns { body.inverse_mass * BALL_INVERSE_INERTIA / (radius * radius) } else { 0.0 };
+        body.inverse_moments = Vec3::new(inverse, inverse, inverse);
         let rotation = marbles.rotation.get(row).copied();
         body.pose.rotation = rotation.map_or_else(|| Pose::identity().rotation, cast_rotation);
         body.pose.translation = cast_vector(marbles.position[row].to_vec());
+    }
+
+    /// Reads a rigid body that a joint holds.
+    fn read_jointed_body(&self, id: BodyId, body: &mut JointBody) {
+        let Ok(row) = self.bodies.row(id) else {
+            *body = JointBody::place(Pose::identity()); // those were taken out
+            return;
+        };
+        let state = &self.bodies.states[row];
+        body.owner = JointOwner::Rigid(row as u32);
+        body.inverse_mass = state.solver.inverse_mass;
+        body.inverse_moments =
+            state.solver.moments.map(|moment| if moment > 0.0 { 1.0 / moment } else { 0.0 });
+        body.radius = state.reach;
+        body.pose = state.solver.pose;
     }
 
     /// Takes the joints back from the solver: impulses, loads, and rotations of marbles.
@@ -160,7 +195,7 @@ impl<S: Scalar> World<S> {
         }
         for (body, is) in system.bodies.iter().zip(&self.scratch.soft_step.jointed.bodies) {
             if let Jointed::Marble(id) = is
-                && body.inverse_inertia > 0.0
+                && body.largest_moment() > 0.0
                 && let Ok(row) = self.marbles.row(*id)
                 && let Some(rotation) = self.marbles.rotation.get_mut(row)
             {
@@ -180,11 +215,34 @@ impl<S: Scalar> Joints<S> {
         })
     }
 
+    /// Pairs of a rigid body and what joints keep from colliding with it.
+    pub(super) fn ignored_bodies(&self) -> BTreeSet<[JointHeld; 2]> {
+        let held = |end: &JointEnd<S>| match *end {
+            JointEnd::Marble { marble, .. } => Some(JointHeld::Marble(marble)),
+            JointEnd::Body { body, .. } => Some(JointHeld::Body(body)),
+            JointEnd::World { .. } => None,
+        };
+        let apart = self.states.iter().filter(|state| !state.joint.collide_connected);
+        let pairs = apart.filter_map(|state| {
+            let [a, b] = state.joint.ends.each_ref().map(held);
+            let (a, b) = (a?, b?);
+            Some([a.min(b), a.max(b)])
+        });
+        pairs.collect()
+    }
+
     /// Returns true if a joint keeps a marble from colliding with something.
     pub(super) fn ignores(&self, marble: MarbleId, other: ColliderId) -> bool {
         let ColliderId::Marble(other) = other else { return false };
         self.ignored_pairs().any(|pair| pair == [marble, other] || pair == [other, marble])
     }
+}
+
+/// What a joint holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum JointHeld {
+    Marble(MarbleId),
+    Body(BodyId),
 }
 
 /// Place in the world that moves from one frame to another one in `dt` seconds.

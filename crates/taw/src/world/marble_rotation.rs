@@ -6,7 +6,7 @@ use super::continuous::Turn;
 use super::marbles::Marbles;
 use crate::math::{Quat, Scalar, Vec3, cast_vector, is_finite};
 use crate::motion::{Rotation, integrate_rotation};
-use crate::response::CapsuleInertia;
+use crate::shape::capsule_unit_inertia;
 
 impl<S: Scalar> Marbles<S> {
     /// Rotation model of a marble in a world of this model.
@@ -160,7 +160,7 @@ impl<S: Scalar> Marbles<S> {
     /// the axis.
     fn precession(&self, row: usize, axis: Vec3<f64>) -> Vec3<f64> {
         let half = self.half_length(row).as_f64();
-        let [along, across] = CapsuleInertia::unit_inertia(self.radius[row].as_f64(), half);
+        let [along, across] = capsule_unit_inertia(self.radius[row].as_f64(), half);
         let angular_velocity = self.angular_velocity_f64(row);
         angular_velocity + axis * (angular_velocity.dot(axis) * (along / across - 1.0))
     }

@@ -8,7 +8,7 @@ use crate::Error;
 use crate::math::{Point3, Scalar, Vec3};
 use crate::motion::Rotation;
 use crate::response::CapsuleInertia;
-use crate::shape::{Capsule, Shape, Sphere};
+use crate::shape::{Capsule, Shape, Sphere, capsule_unit_inertia};
 
 /// Fraction of the half length of a capsule from which on a point of its axis counts as an end of it.
 pub(super) const END: f64 = 0.999;
@@ -81,7 +81,7 @@ impl<S: Scalar> Marbles<S> {
         rods.extend((0..self.len()).map(|row| {
             let (axis, half) = (self.axis(row), self.half_length(row));
             let turns = self.rotation_of(row, model) == Rotation::Dynamic;
-            let moments = CapsuleInertia::unit_inertia(self.radius[row], half);
+            let moments = capsule_unit_inertia(self.radius[row], half);
             let whirl = moments.map(|moment| if turns { moment.recip() } else { S::zero() });
             CapsuleInertia { axis, half_length: half, inverse_unit_inertia: whirl }
         }));

@@ -1,5 +1,7 @@
 //! World: its state as columns, its step, queries, and the energy audit.
 
+mod bodies;
+mod body_contacts;
 mod changed_rows;
 mod contact_impulses;
 mod contact_limit;
@@ -42,6 +44,7 @@ mod solver_columns;
 mod sparse_column;
 mod step;
 mod swarm;
+mod swept_manifold;
 mod swept_walls;
 #[cfg(test)]
 mod tests;
@@ -67,6 +70,7 @@ pub use wall_shape::WallShape;
 pub use walls::{WallId, Walls};
 
 use crate::Error;
+use crate::body::Bodies;
 use crate::broad::{Grid, Period};
 use crate::contact::Contacts;
 use crate::error::{finite, finite_vector, positive};
@@ -96,6 +100,8 @@ pub struct World<S: Scalar> {
     pub swarm: Swarm<S>,
     /// Joints between marbles, and between a marble and a place in the world.
     pub joints: Joints<S>,
+    /// Rigid bodies.
+    pub bodies: Bodies<S>,
     /// Sensors: shapes that tell which marbles enter and leave.
     pub sensors: Sensors<S>,
     /// Contacts of the last substep, except those of marbles [asleep](Self::is_asleep) with each

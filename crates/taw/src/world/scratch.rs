@@ -1,6 +1,7 @@
 //! Scratch memory of a step: lists kept for their capacity, what can be found again, and measurements
 //! (residual, energy audit).
 
+use super::bodies::BodyScratch;
 use super::contact_limit::ContactLimit;
 use super::continuous::Continuous;
 use super::energy_audit::AuditState;
@@ -45,6 +46,7 @@ pub(super) struct WorldScratch<S> {
     pub substep: S,
     pub events: EventSolver,
     pub soft_step: SoftRows<S>,
+    pub bodies: BodyScratch<S>,
     pub continuous: Continuous<S>,
     pub lasting_contacts: LastingContacts,
     pub sleep: SleepScratch,

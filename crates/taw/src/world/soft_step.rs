@@ -20,7 +20,7 @@ use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::Rotation;
 use crate::response::Material;
 use crate::swarm::{
-    BallSurface, Body, INFINITE_MASS, LEAST_RADIUS, MAX_COORDINATE, MarbleRow, NearLimits,
+    BallSurface, BodyRow, INFINITE_MASS, LEAST_RADIUS, MAX_COORDINATE, MarbleRow, NearLimits,
     SyncToken, VelocityChange,
 };
 use crate::workers::append_all;
@@ -35,7 +35,7 @@ pub(super) struct SoftRows<S> {
     pub slot_of_marble: Vec<u32>,
     pub marble_of_slot: Vec<u32>,
     pub jointed: JointedBodies,
-    changed: Vec<Body<S>>,
+    changed: Vec<BodyRow<S>>,
     lists: Vec<ChunkContacts<S>>,
     /// Length of the step that was integrated, in seconds.
     dt: S,
@@ -190,6 +190,7 @@ impl<S: Scalar> World<S> {
         self.walls.update_tree();
         self.audit_rows_before();
         self.give_joints(dt);
+        self.give_bodies(dt);
         let walls = SweptWalls::new(&self.walls, dt);
         if is_changed || !self.swarm.is_prepared() {
             self.swarm.prepare(dt, self.settings.gravity, &walls, identity);
@@ -207,6 +208,7 @@ impl<S: Scalar> World<S> {
         let columns = self.marbles.body_columns(turns);
         self.swarm.read_bodies(marbles, columns, Some(dt), &mut self.scratch.stopped);
         self.take_joints();
+        self.take_bodies(dt);
         self.quarantine_stopped();
         self.list_impacts(dt);
         self.audit_rows_after();
@@ -376,7 +378,7 @@ impl<S: Scalar> World<S> {
             let flags = [is_kinematic, sleepless];
             if !self.swarm.is_as_read(slot, marble, numbers, (surface, layers), flags) {
                 let body = body(slot, marble, inverse_mass, surface);
-                changed.push(Body { layers, is_kinematic, sleeping_disabled: sleepless, ..body });
+                changed.push(BodyRow { layers, is_kinematic, sleeping_disabled: sleepless, ..body });
             }
         }
     }
@@ -425,9 +427,9 @@ fn body<S: Scalar>(
     marble: MarbleRow<S>,
     inverse_mass: S,
     surface: Option<BallSurface<S>>,
-) -> Body<S> {
+) -> BodyRow<S> {
     let spin = marble.spin.map_or_else(Vec3::zero, |spin| spin * marble.radius);
-    Body {
+    BodyRow {
         slot,
         at: clamped_row(marble.position.to_vec(), row_radius(marble.radius)),
         velocity: clamped_row(marble.velocity, inverse_mass),

@@ -7,7 +7,7 @@ use super::{EventBall, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
 use crate::broad::Period;
 use crate::contact::Contacts;
 use crate::math::{Point3, UnionFind, Vec3};
-use crate::motion::BALL_INERTIA;
+use crate::shape::BALL_INERTIA;
 use crate::response::impulse::{self, CachedImpulse, Context, SubstepStart, solve_contacts};
 use crate::response::{BallRotation, EnergyLedger, SolverBodies};
 

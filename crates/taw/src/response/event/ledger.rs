@@ -4,7 +4,7 @@ use cgmath::InnerSpace;
 
 use super::{EventBall, EventSolver, Wall};
 use crate::math::Vec3;
-use crate::motion::BALL_INERTIA;
+use crate::shape::BALL_INERTIA;
 use crate::response::{BallRotation, EnergyLedger};
 
 impl EventSolver {

@@ -7,7 +7,7 @@ use super::collide::Collision;
 use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::contact::ContactMaterial;
 use crate::math::Vec3;
-use crate::motion::BALL_INERTIA;
+use crate::shape::BALL_INERTIA;
 use crate::response::BallRotation;
 
 /// Maximum number of iterations.

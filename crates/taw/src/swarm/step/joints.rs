@@ -2,8 +2,8 @@
 
 use cgmath::Zero;
 
-use crate::handle::NO_ROW;
-use crate::joint::{JointBody, JointSystem};
+use crate::body::{BodySystem, SolverBody};
+use crate::joint::{JointBody, JointOwner, JointSystem};
 use crate::math::{Row, Scalar, Vec3, cast_vector};
 use crate::swarm::Swarm;
 use crate::swarm::kernels::{Pass, SolverParams};
@@ -30,10 +30,12 @@ impl<S: Scalar> Swarm<S> {
     pub(super) fn solve_contacts_and_joints(&mut self, params: &SolverParams<S>, share: S) {
         let h = params.time.as_f64();
         self.pass(Pass::WarmStart(*params), |_, _| true);
+        self.with_bodies(BodySystem::warm_start);
         if self.has_joints() {
             self.find_falls(params.time, share);
             self.with_joints(|joints| joints.begin(h));
         }
+        self.with_bodies(BodySystem::solve);
         self.pass(Pass::Solve(*params), |_, _| true);
         self.solve_unconverged(params);
         if self.has_joints() {
@@ -49,6 +51,7 @@ impl<S: Scalar> Swarm<S> {
             joints.advance(h);
             joints.begin_relaxation(h);
         });
+        self.with_bodies(BodySystem::relax);
         self.relax_recorded(params);
         self.with_joints(|joints| joints.finish_relaxation(h));
     }
@@ -59,13 +62,23 @@ impl<S: Scalar> Swarm<S> {
         let gravity = self.gravity.unwrap_or_else(Vec3::zero);
         let half = S::from_f64(-0.5);
         let mut joints = std::mem::take(&mut self.scratch.joints);
-        for body in joints.bodies.iter_mut().filter(|body| body.slot != NO_ROW) {
-            let row = self.ids.rows()[body.slot as usize] as usize;
+        let borne = self.scratch.bodies.borne();
+        for body in &mut joints.bodies {
             body.fall = Vec3::zero();
+            let slot = match body.owner {
+                JointOwner::Place => continue,
+                JointOwner::Ball(slot) => slot,
+                JointOwner::Rigid(index) => {
+                    let index = index as usize;
+                    body.fall = self.scratch.bodies.bodies[index].fall(h.as_f64(), borne[index]);
+                    continue;
+                }
+            };
+            let row = self.ids.rows()[slot as usize] as usize;
             if self.spin[row][3] == S::zero() {
                 body.fall += cast_vector(gravity * (half * h * h));
                 let own =
-                    self.velocity_changes.binary_search_by_key(&body.slot, |change| change.slot);
+                    self.velocity_changes.binary_search_by_key(&slot, |change| change.slot);
                 if let Ok(own) = own {
                     let change = Vec3::from(self.velocity_changes[own].change);
                     body.fall += cast_vector(change * (half * share));
@@ -82,8 +95,18 @@ impl<S: Scalar> Swarm<S> {
         }
         let mut joints = std::mem::take(&mut self.scratch.joints);
         let rows = self.ids.rows();
-        for body in joints.bodies.iter_mut().filter(|body| body.slot != NO_ROW) {
-            let row = rows[body.slot as usize] as usize;
+        let rigid = &mut self.scratch.bodies.bodies;
+        for body in &mut joints.bodies {
+            let slot = match body.owner {
+                JointOwner::Place => continue,
+                JointOwner::Ball(slot) => slot,
+                JointOwner::Rigid(index) => {
+                    let SolverBody { pose, velocity, spin, .. } = rigid[index as usize];
+                    (body.pose, body.velocity, body.spin) = (pose, velocity, spin);
+                    continue;
+                }
+            };
+            let row = rows[slot as usize] as usize;
             let at = self.at[row];
             body.pose.translation = cast_vector(xyz(&at));
             body.velocity = cast_vector(xyz(&self.velocity[row]));
@@ -91,14 +114,22 @@ impl<S: Scalar> Swarm<S> {
             body.spin = cast_vector::<S, f64>(xyz(&self.spin[row])) / at[3].as_f64();
         }
         action(&mut joints);
-        for body in joints.bodies.iter().filter(|body| body.slot != NO_ROW) {
-            let row = rows[body.slot as usize] as usize;
-            let JointBody { velocity, spin, inverse_mass, inverse_inertia, .. } = body;
+        for body in &joints.bodies {
+            let JointBody { velocity, spin, inverse_mass, .. } = body;
+            let slot = match body.owner {
+                JointOwner::Place => continue,
+                JointOwner::Ball(slot) => slot,
+                JointOwner::Rigid(index) => {
+                    rigid[index as usize].set_velocities(*velocity, *spin);
+                    continue;
+                }
+            };
+            let row = rows[slot as usize] as usize;
             let radius = self.at[row][3].as_f64();
             if *inverse_mass > 0.0 {
                 set(&mut self.velocity[row], cast_vector(*velocity));
             }
-            if *inverse_inertia > 0.0 {
+            if body.largest_moment() > 0.0 {
                 set(&mut self.spin[row], cast_vector(*spin * radius));
             }
         }

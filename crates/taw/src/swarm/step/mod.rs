@@ -1,6 +1,7 @@
 //! A step of a swarm, and its parts in the full tier.
 
 mod backing;
+mod bodies;
 mod bounces;
 mod cluster;
 mod islands;
@@ -14,6 +15,7 @@ mod sleep;
 mod unconverged;
 mod wall_contacts;
 
+pub(crate) use bodies::BallView;
 pub(super) use bounces::WayToWall;
 pub(super) use passages::SavedPlace;
 pub(super) use sleep::inverse_masses;
@@ -193,7 +195,8 @@ impl<S: Scalar> Swarm<S> {
     ) {
         self.scratch.backing.clear(); // of other rows
         self.scratch.backing_speed.clear();
-        if !self.pairs_valid || self.chunks.iter().all(|chunk| chunk.asleep) {
+        let is_idle = !self.pairs_valid || self.chunks.iter().all(|chunk| chunk.asleep);
+        if is_idle && !self.has_bodies() {
             return;
         }
         self.list_proxy_rows();
@@ -221,6 +224,7 @@ impl<S: Scalar> Swarm<S> {
             self.integrate(row(gravity * h), [zero; 4], [zero; 4]);
             self.advance_proxies(parts, false, zero);
             observe(Stage::Restitute);
+            self.begin_bodies(&params);
             self.find_backing();
             self.solve_contacts_and_joints(&params, h / substeps);
             self.record_contact_impulses(S::one());
@@ -233,6 +237,7 @@ impl<S: Scalar> Swarm<S> {
             let caught = self.stop_at_walls(walls, h, gravity * (half * h * h));
             self.scratch.path_changes.clear();
             self.advance_proxies(parts, true, h);
+            self.with_bodies(|bodies| bodies.advance(h.as_f64()));
             let (skin, before, left) = (self.skin, left, left - h);
             let left_it = |_, _: &Row<S>, skin_left: S, _: &FastMovers<S>| skin_left < -skin;
             if self.find_pairs_within_step(|chunk| chunk.overrun, left_it, dt, walls, observe) {

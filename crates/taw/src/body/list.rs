@@ -1,0 +1,413 @@
+//! Bodies of a world, by handles that stay valid.
+
+use std::sync::Arc;
+
+use cgmath::{EuclideanSpace, InnerSpace, Zero};
+
+use super::contact::BodyContact;
+use super::state::SolverBody;
+use super::{Body, BodyId};
+use crate::Error;
+use crate::contact::as_convex;
+use crate::error::{finite_point, finite_vector};
+use crate::frame::Pose;
+use crate::handle::Handles;
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector};
+use crate::shape::{Aabb3, BoundedShape, MassProperties, Shape};
+
+/// State of a body.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct BodyState<S> {
+    /// As it was set.
+    pub body: Body<S>,
+    /// Its principal axes in its frame.
+    pub principal: Pose<f64>,
+    /// Its convex parts along its principal axes, about its center of mass.
+    pub parts: Arc<[Shape<f64>]>,
+    pub solver: SolverBody,
+    /// Distance of its surface from its center of mass, at most, in metres.
+    pub reach: f64,
+    /// Force in N and torque in N m in the next step.
+    pub force: [Vec3<f64>; 2],
+    /// Time for which it has been slow, in seconds, and whether it sleeps.
+    pub rest: f64,
+    pub asleep: bool,
+}
+
+/// Rigid bodies of a world, which only [`SoftStep`](crate::response::Response::SoftStep) knows: other responses refuse
+/// to step a world that has some.
+///
+/// Bodies collide with each other, with walls, with marbles and with the balls of the swarm. They are solved on one
+/// thread.
+///
+/// ```
+/// use taw::body::Body;
+/// use taw::prelude::*;
+///
+/// # fn main() -> Result<(), taw::Error> {
+/// let mut world = World::<f32>::default();
+/// world.set_model(Model::GAME)?;
+/// world.set_gravity(Vec3::new(0.0, -9.81, 0.0))?;
+/// world.walls.insert(Plane::new(Vec3::unit_y(), 0.0)?)?;
+/// let half = Vec3::new(0.2, 0.1, 0.3);
+/// let crate_ = world.bodies.insert(Body::cuboid(half, Point3::new(0.0, 0.5, 0.0)))?;
+/// for _ in 0..120 {
+///     world.step(1.0 / 60.0)?;
+/// }
+/// let at = world.bodies.get(crate_)?.position;
+/// assert!((at.y - 0.1).abs() < 1e-3, "it stands on the floor");
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bodies<S> {
+    handles: Handles,
+    pub(crate) states: Vec<BodyState<S>>,
+    /// Contacts of the last step, in the order of their keys.
+    pub(crate) contacts: Vec<BodyContact>,
+    /// Bodies that the last step stopped, since their motion overflowed.
+    pub(crate) stopped: Vec<BodyId>,
+}
+
+impl<S: Scalar> BodyState<S> {
+    fn new(body: Body<S>) -> Result<Self, Error> {
+        let properties = body.mass_properties()?.map(|properties| properties.cast::<f64>());
+        let shape = body.shape.cast::<f64>();
+        let principal = properties.map_or_else(
+            || Pose { translation: center_of(&shape), ..Pose::identity() },
+            |of| Pose { rotation: of.axes, translation: of.center.to_vec() },
+        );
+        let shape = shape.transformed(principal.inverse());
+        let parts: Arc<[_]> = match shape {
+            Shape::Compound(compound) => compound.parts().iter().cloned().collect(),
+            simple => [simple].into_iter().collect(),
+        };
+        let solver = SolverBody::rigid(properties.as_ref(), Pose::identity());
+        let reach = parts.iter().map(reach_of).fold(0.0, f64::max);
+        let mut state = Self {
+            principal,
+            parts,
+            solver,
+            reach,
+            force: [Vec3::zero(); 2],
+            rest: 0.0,
+            asleep: false,
+            body,
+        };
+        state.set_pose(Pose {
+            rotation: cast_rotation(state.body.rotation),
+            translation: cast_vector(state.body.position.to_vec()),
+        });
+        state.solver.velocity = cast_vector(state.body.velocity);
+        state.solver.spin = cast_vector(state.body.angular_velocity);
+        Ok(state)
+    }
+
+    /// Places its frame.
+    fn set_pose(&mut self, frame: Pose<f64>) {
+        let frame = Pose { rotation: frame.rotation.normalize(), ..frame };
+        self.solver.set_pose(frame * self.principal);
+    }
+
+    /// Pose of its frame.
+    pub fn pose(&self) -> Pose<f64> {
+        self.solver.pose * self.principal.inverse()
+    }
+
+    /// Its convex part in the world.
+    pub fn part(&self, part: usize) -> Shape<f64> {
+        self.parts[part].transformed(self.solver.pose)
+    }
+
+    /// It in the solver: as an obstacle while it sleeps.
+    pub fn in_solver(&self) -> SolverBody {
+        if self.asleep { self.solver.at_rest() } else { self.solver }
+    }
+
+    /// True if contacts and gravity move it.
+    pub fn is_dynamic(&self) -> bool {
+        self.solver.inverse_mass > 0.0
+    }
+
+    /// Wakes it.
+    pub fn wake(&mut self) {
+        (self.rest, self.asleep) = (0.0, false);
+    }
+
+    /// Speed of its surface, at most, in m/s.
+    pub fn speed(&self) -> f64 {
+        self.solver.velocity.magnitude() + self.solver.spin.magnitude() * self.reach
+    }
+
+    /// Falls asleep.
+    pub fn fall_asleep(&mut self) {
+        self.asleep = true;
+        self.solver.stop();
+    }
+
+    /// Body as it is now.
+    fn now(&self) -> Body<S> {
+        let pose = self.pose();
+        Body {
+            position: Point3::from_vec(cast_vector(pose.translation)),
+            rotation: cast_rotation(pose.rotation),
+            velocity: cast_vector(self.solver.velocity),
+            angular_velocity: cast_vector(self.solver.spin),
+            ..self.body.clone()
+        }
+    }
+}
+
+impl<S: Scalar> Bodies<S> {
+    /// Adds a body.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`], [`Error::NotPositive`], [`Error::NotUnit`] or [`Error::OutOfRange`] for its numbers;
+    /// [`Error::NotPositive`] for the `volume` of a flat shape of uniform density; [`Error::Full`] at 2³² − 1
+    /// bodies.
+    pub fn insert(&mut self, body: Body<S>) -> Result<BodyId, Error> {
+        let state = BodyState::new(body.validated()?)?;
+        let id = BodyId(self.handles.push()?);
+        self.states.push(state);
+        Ok(id)
+    }
+
+    /// Changes a body: its place, motion, shape, mass, kind. It wakes.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`], and those of [`Self::insert`].
+    pub fn set(&mut self, id: BodyId, body: Body<S>) -> Result<(), Error> {
+        let row = self.row(id)?;
+        self.states[row] = BodyState::new(body.validated()?)?;
+        Ok(())
+    }
+
+    /// Takes a body out. What touched it wakes.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`].
+    pub fn remove(&mut self, id: BodyId) -> Result<Body<S>, Error> {
+        let row = self.row(id)?;
+        let body = self.states[row].now();
+        self.wake_beside(id);
+        self.contacts.retain(|contact| !contact.is_of(id));
+        self.handles.swap_remove(id.0);
+        self.states.swap_remove(row);
+        Ok(body)
+    }
+
+    /// Body as it is now.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`].
+    pub fn get(&self, id: BodyId) -> Result<Body<S>, Error> {
+        Ok(self.states[self.row(id)?].now())
+    }
+
+    /// Pose of its frame in the world.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`].
+    pub fn pose(&self, id: BodyId) -> Result<Pose<S>, Error> {
+        let pose = self.states[self.row(id)?].pose();
+        let rotation = cast_rotation(pose.rotation);
+        Ok(Pose { rotation, translation: cast_vector(pose.translation) })
+    }
+
+    /// Places it elsewhere, without a speed from that. It wakes.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`], [`Error::NotFinite`] or [`Error::NotUnit`].
+    pub fn set_pose(&mut self, id: BodyId, pose: Pose<S>) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let Pose { rotation, translation } = pose.validated()?;
+        self.wake_beside(id);
+        let state = &mut self.states[row];
+        state.wake();
+        state.set_pose(Pose {
+            rotation: cast_rotation(rotation),
+            translation: cast_vector(translation),
+        });
+        Ok(())
+    }
+
+    /// Sets the velocity of its center of mass, in m/s, and its angular velocity, in rad/s. It wakes.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`], [`Error::NotFinite`].
+    pub fn set_velocity(
+        &mut self,
+        id: BodyId,
+        velocity: Vec3<S>,
+        angular_velocity: Vec3<S>,
+    ) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let velocity = finite_vector(["velocity.x", "velocity.y", "velocity.z"], velocity)?;
+        let names = ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"];
+        let spin = finite_vector(names, angular_velocity)?;
+        let state = &mut self.states[row];
+        state.wake();
+        (state.solver.velocity, state.solver.momentum) = (cast_vector(velocity), None);
+        state.solver.spin = cast_vector(spin);
+        Ok(())
+    }
+
+    /// Applies a force in N at a point of the world in the next step. It wakes.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`], [`Error::NotFinite`].
+    pub fn apply_force(
+        &mut self,
+        id: BodyId,
+        force: Vec3<S>,
+        point: Point3<S>,
+    ) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let force = cast_vector(finite_vector(["force.x", "force.y", "force.z"], force)?);
+        let arm = self.arm(row, point)?;
+        let state = &mut self.states[row];
+        state.wake();
+        state.force[0] += force;
+        state.force[1] += arm.cross(force);
+        Ok(())
+    }
+
+    /// Applies an impulse in N s at a point of the world, at once. It wakes.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`], [`Error::NotFinite`].
+    pub fn apply_impulse(
+        &mut self,
+        id: BodyId,
+        impulse: Vec3<S>,
+        point: Point3<S>,
+    ) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let names = ["impulse.x", "impulse.y", "impulse.z"];
+        let impulse = cast_vector(finite_vector(names, impulse)?);
+        let arm = self.arm(row, point)?;
+        let state = &mut self.states[row];
+        state.wake();
+        state.solver.apply(impulse, arm);
+        Ok(())
+    }
+
+    /// Mass properties along the axes of its frame; none of infinite mass.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`].
+    pub fn mass_properties(&self, id: BodyId) -> Result<Option<MassProperties<S>>, Error> {
+        self.states[self.row(id)?].body.mass_properties()
+    }
+
+    /// Kinetic energy in J; zero of infinite mass.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`].
+    pub fn kinetic_energy(&self, id: BodyId) -> Result<S, Error> {
+        let [kinetic, rotational] = self.states[self.row(id)?].solver.energies();
+        Ok(S::from_f64(kinetic + rotational))
+    }
+
+    /// Returns true if it sleeps.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`].
+    pub fn is_asleep(&self, id: BodyId) -> Result<bool, Error> {
+        Ok(self.states[self.row(id)?].asleep)
+    }
+
+    /// Wakes it.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`].
+    pub fn wake(&mut self, id: BodyId) -> Result<(), Error> {
+        let row = self.row(id)?;
+        self.states[row].wake();
+        Ok(())
+    }
+
+    /// Handles of all bodies.
+    pub fn ids(&self) -> impl Iterator<Item = BodyId> + '_ {
+        (0..self.states.len()).filter_map(|row| self.id(row))
+    }
+
+    /// Bodies that the last step stopped at their last place, since their motion overflowed.
+    #[must_use]
+    pub fn stopped(&self) -> &[BodyId] {
+        &self.stopped
+    }
+
+    /// Number of bodies.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.states.len()
+    }
+
+    /// Returns true if there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.states.is_empty()
+    }
+
+    /// Number of removals so far.
+    pub(crate) fn removals(&self) -> u64 {
+        self.handles.removals()
+    }
+
+    pub(crate) fn id(&self, row: usize) -> Option<BodyId> {
+        self.handles.handle(row).map(BodyId)
+    }
+
+    pub(crate) fn row(&self, id: BodyId) -> Result<usize, Error> {
+        self.handles.row(id.0).ok_or(Error::NoSuchBody(id))
+    }
+
+    /// Way from the center of mass to a point.
+    fn arm(&self, row: usize, point: Point3<S>) -> Result<Vec3<f64>, Error> {
+        let point = finite_point(["point.x", "point.y", "point.z"], point)?;
+        Ok(cast_point::<S, f64>(point).to_vec() - self.states[row].solver.pose.translation)
+    }
+
+    /// Wakes a sleeper, and all that sleep with it.
+    pub(crate) fn wake_island(&mut self, row: usize) {
+        let mut next = vec![row];
+        while let Some(row) = next.pop() {
+            if !self.states[row].asleep {
+                continue;
+            }
+            self.states[row].wake();
+            let Some(id) = self.id(row) else { continue };
+            let beside = self.contacts.iter().filter_map(|contact| contact.other(id));
+            next.extend(beside.filter_map(|id| self.row(id).ok()));
+        }
+    }
+
+    /// Wakes the bodies that touch one.
+    fn wake_beside(&mut self, id: BodyId) {
+        let beside = self.contacts.iter().filter_map(|contact| contact.other(id));
+        let rows: Vec<_> = beside.filter_map(|id| self.row(id).ok()).collect();
+        for row in rows {
+            self.wake_island(row);
+        }
+    }
+}
+
+/// Center of the bounding box of a shape.
+fn center_of(shape: &Shape<f64>) -> Vec3<f64> {
+    shape.bounding_box().center().to_vec()
+}
+
+/// Distance from the origin of a convex shape, at most.
+fn reach_of(shape: &Shape<f64>) -> f64 {
+    if let Some(ball) = as_convex(shape).and_then(|shape| shape.as_sphere()) {
+        return ball.center.to_vec().magnitude() + ball.radius;
+    }
+    let Aabb3 { min, max } = shape.bounding_box();
+    let far = |axis: usize| min[axis].abs().max(max[axis].abs());
+    Vec3::new(far(0), far(1), far(2)).magnitude()
+}
+
+fn cast_rotation<S: Scalar, T: Scalar>(Quat { s, v }: Quat<S>) -> Quat<T> {
+    Quat { s: T::from_f64(s.as_f64()), v: cast_vector(v) }
+}

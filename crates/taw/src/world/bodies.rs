@@ -1,0 +1,175 @@
+//! Rigid bodies of a world: in the third verb of [`SoftStep`](crate::response::Response::SoftStep), and their sleep.
+
+use cgmath::{InnerSpace, Zero};
+
+use super::World;
+use super::body_contacts::BodyCandidate;
+use crate::Error;
+use crate::body::{BodyContact, BodyState, BodySystem, Partner};
+use crate::math::{Scalar, UnionFind, Vec3, cast_vector};
+use crate::motion::rest;
+
+/// What a sleeping body lies on: gravity, and the identity of the walls.
+#[derive(Clone, Debug, Default)]
+pub(super) struct BodyScratch<S> {
+    gravity: Option<Vec3<S>>,
+    walls: u64,
+    islands: UnionFind,
+}
+
+impl<S: Scalar> World<S> {
+    /// Refuses bodies where the response has no method for them.
+    pub(super) fn check_bodies(&self) -> Result<(), Error> {
+        if self.bodies.is_empty() || self.settings.model.response.uses_swarm_rows() {
+            return Ok(());
+        }
+        Err(Error::Unsupported { response: "a response other than SoftStep", feature: "rigid bodies" })
+    }
+
+    /// Gives bodies and their contacts to the solver for a step of `dt` seconds.
+    pub(super) fn give_bodies(&mut self, dt: S) {
+        self.bodies.stopped.clear();
+        if self.bodies.is_empty() {
+            return;
+        }
+        self.wake_bodies_beside_changes();
+        for id in &self.scratch.soft_step.jointed.rigid {
+            if let Ok(row) = self.bodies.row(*id) {
+                self.bodies.states[row].wake(); // what is joined does not sleep
+            }
+        }
+        let gravity: Vec3<f64> = cast_vector(self.settings.gravity);
+        let step = dt.as_f64();
+        for state in self.bodies.states.iter_mut().filter(|state| state.is_dynamic()) {
+            let [force, torque] = std::mem::replace(&mut state.force, [Vec3::zero(); 2]);
+            let solver = &mut state.solver;
+            solver.acceleration = gravity * state.body.gravity_scale.as_f64()
+                + force * solver.inverse_mass;
+            solver.damping = state.body.damping.map(S::as_f64);
+            solver.turn(torque * step);
+        }
+        let system = self.find_body_contacts(dt);
+        self.swarm.set_rigid_bodies(system);
+    }
+
+    /// Takes bodies and their contacts back from the solver.
+    pub(super) fn take_bodies(&mut self, dt: S) {
+        if self.bodies.is_empty() {
+            return;
+        }
+        let BodySystem { bodies, contacts, .. } = self.swarm.take_rigid_bodies();
+        let mut stopped = Vec::new();
+        for (row, (state, solver)) in self.bodies.states.iter_mut().zip(&bodies).enumerate() {
+            if state.asleep {
+                continue;
+            }
+            if solver.is_finite() {
+                state.solver = *solver;
+                continue;
+            }
+            state.solver.stop();
+            stopped.push(row);
+        }
+        self.bodies.stopped = stopped.into_iter().filter_map(|row| self.bodies.id(row)).collect();
+        self.keep_contacts(contacts);
+        self.update_body_sleep(dt);
+    }
+
+    /// Remembers contacts, those of sleepers too, which were not looked for.
+    fn keep_contacts(&mut self, contacts: Vec<BodyContact>) {
+        let before = std::mem::replace(&mut self.bodies.contacts, contacts);
+        let sleeps = |id| self.bodies.row(id).is_ok_and(|row| self.bodies.states[row].asleep);
+        let slept = |contact: &BodyContact| {
+            sleeps(contact.key.body)
+                && match contact.key.partner {
+                    Partner::Body(other) => sleeps(other),
+                    Partner::Ball(_) => false,
+                    Partner::Wall(wall) => self.walls.row(wall).is_ok(),
+                }
+        };
+        let kept: Vec<_> = before.into_iter().filter(slept).collect();
+        if !kept.is_empty() {
+            self.bodies.contacts.extend(kept);
+            self.bodies.contacts.sort_by_key(|contact| contact.key);
+            self.bodies.contacts.dedup_by_key(|contact| contact.key);
+        }
+    }
+
+    /// Wakes bodies where gravity or walls changed.
+    fn wake_bodies_beside_changes(&mut self) {
+        let now = (Some(self.settings.gravity), self.walls.identity());
+        let scratch = &mut self.scratch.bodies;
+        if (scratch.gravity, scratch.walls) != now {
+            (scratch.gravity, scratch.walls) = now;
+            self.bodies.states.iter_mut().for_each(BodyState::wake);
+        }
+    }
+
+    /// Wakes bodies that others come near to, and balls that bodies do. Returns true if a body woke.
+    pub(super) fn wake_disturbed_bodies(&mut self, candidates: &[BodyCandidate], dt: f64) -> bool {
+        let states = &self.bodies.states;
+        let gravity = cast_vector::<S, f64>(self.settings.gravity).magnitude();
+        let is_fast = |speed: f64, reach: f64| speed > rest::sleep_speed(gravity, reach);
+        let stirs = |state: &BodyState<S>| !state.asleep && is_fast(state.speed(), state.reach);
+        let mut bodies = Vec::new();
+        if states.iter().any(|state| state.asleep) {
+            let tree = BodyCandidate::tree(candidates);
+            for near in candidates.iter().filter(|it| stirs(&states[it.row])) {
+                tree.for_each_in_box(&near.bounds, |row| bodies.push(row as usize));
+            }
+        }
+        let mut balls = Vec::new();
+        self.visit_balls_near_bodies(candidates, dt, |ball, row, _| {
+            let speed = cast_vector::<S, f64>(ball.velocity).magnitude();
+            if ball.is_asleep && stirs(&states[row]) {
+                balls.push(ball.row);
+            } else if !ball.is_asleep && is_fast(speed, ball.radius()) {
+                bodies.push(row);
+            }
+        });
+        for row in balls {
+            self.swarm.wake_row(row);
+        }
+        bodies.retain(|row| self.bodies.states[*row].asleep);
+        let any = !bodies.is_empty();
+        for row in bodies {
+            self.bodies.wake_island(row);
+        }
+        any
+    }
+
+    /// Lets islands of bodies that have all rested long enough fall asleep.
+    fn update_body_sleep(&mut self, dt: S) {
+        let gravity = cast_vector::<S, f64>(self.settings.gravity).magnitude();
+        let sleeps = self.swarm.model().sleeps;
+        for state in &mut self.bodies.states {
+            let square = state.solver.velocity.magnitude2()
+                + state.solver.spin.magnitude2() * state.reach * state.reach;
+            let rests = rest::is_slow(square, gravity, state.reach);
+            let may = sleeps && !state.body.sleeping_disabled && state.is_dynamic();
+            state.rest = if rests && may { state.rest + dt.as_f64() } else { 0.0 };
+        }
+        let (states, islands) = (&self.bodies.states, &mut self.scratch.bodies.islands);
+        islands.reset(states.len());
+        for contact in self.bodies.contacts.iter().filter(|contact| contact.presses()) {
+            let Partner::Body(other) = contact.key.partner else { continue };
+            let (Ok(a), Ok(b)) = (self.bodies.row(other), self.bodies.row(contact.key.body)) else {
+                continue;
+            };
+            if states[a].is_dynamic() && states[b].is_dynamic() {
+                islands.join(a, b);
+            }
+        }
+        let mut restless = vec![false; states.len()];
+        let lasts = |state: &BodyState<S>| rest::lasts(state.rest, state.reach, gravity);
+        let of_row: Vec<_> = (0..states.len()).map(|row| islands.set_of(row) as usize).collect();
+        for (state, island) in states.iter().zip(&of_row) {
+            restless[*island] |= !state.asleep && !lasts(state);
+        }
+        for (state, island) in self.bodies.states.iter_mut().zip(&of_row) {
+            if state.is_dynamic() && !restless[*island] && !state.asleep {
+                state.fall_asleep();
+            }
+        }
+    }
+}

@@ -1,0 +1,343 @@
+//! What rigid bodies touch: candidates by boxes, and manifolds of convex parts.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use cgmath::{EuclideanSpace, InnerSpace};
+
+use super::World;
+use super::joints::JointHeld;
+use super::swept_manifold::{ContactReach, swept_manifold};
+use super::walls::SubShape;
+use crate::body::{
+    BodyContact, BodyState, BodySystem, ContactKey, Partner, SolverBody, ball_contact,
+    manifold_contact,
+};
+use crate::broad::CollisionFilter;
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
+use crate::motion::WallMotion;
+use crate::response::event::WallCollider;
+use crate::shape::{Aabb, Aabb3, BoundedShape, Bvh};
+use crate::swarm::BallView;
+
+/// Margin beyond the motion of a step within which contacts are listed, over the reach of the smaller body.
+const MARGIN: f64 = 0.02;
+/// Distance from another wall within which a point counts as on it, over the reach of the body.
+const FLUSH: f64 = 0.01;
+/// Cosine of the angle between two normals from which on they count as one.
+const PARALLEL: f64 = 0.99;
+
+/// Body with the boxes in which its parts stay in the step.
+pub(super) struct BodyCandidate {
+    pub row: usize,
+    /// Distance that its surface goes in the step, at most, with the slack, in metres.
+    margin: f64,
+    /// Distance within which contacts are listed, whatever moves, in metres.
+    slack: f64,
+    pub bounds: Aabb3<f64>,
+}
+
+impl BodyCandidate {
+    fn list<S: Scalar>(states: &[BodyState<S>], dt: f64) -> Vec<Self> {
+        let rows = states.iter().enumerate();
+        rows.map(|(row, state)| Self::new(row, state, dt)).collect()
+    }
+
+    /// Tree of their boxes.
+    pub fn tree(candidates: &[Self]) -> Bvh<f64> {
+        let boxes: Vec<_> = candidates.iter().map(|candidate| candidate.bounds).collect();
+        Bvh::new(&boxes)
+    }
+
+    fn new<S: Scalar>(row: usize, state: &BodyState<S>, dt: f64) -> Self {
+        let SolverBody { velocity, spin, acceleration, .. } = state.solver;
+        let turn = (spin.magnitude() * dt).min(std::f64::consts::PI) * state.reach;
+        let speed = velocity.magnitude() + acceleration.magnitude() * dt;
+        let margin = if state.asleep { 0.0 } else { speed * dt + turn };
+        let slack = MARGIN * state.reach;
+        let margin = margin + slack;
+        let boxes = (0..state.parts.len()).map(|part| state.part(part).bounding_box());
+        let none = Aabb { min: state.solver.center(), max: state.solver.center() };
+        let bounds = boxes.reduce(|all, next| all.union(&next)).unwrap_or(none);
+        Self { row, margin, slack, bounds: grown(&bounds, margin) }
+    }
+}
+
+/// Box with this much more on each side.
+fn grown(bounds: &Aabb3<f64>, by: f64) -> Aabb3<f64> {
+    let by = Vec3::new(by, by, by);
+    Aabb { min: bounds.min - by, max: bounds.max + by }
+}
+
+impl<S: Scalar> World<S> {
+    /// Finds the contacts of bodies that are awake, for a step of `dt` seconds.
+    pub(super) fn find_body_contacts(&mut self, dt: S) -> BodySystem {
+        let step = dt.as_f64();
+        let mut candidates = BodyCandidate::list(&self.bodies.states, step);
+        while self.wake_disturbed_bodies(&candidates, step) {
+            candidates = BodyCandidate::list(&self.bodies.states, step);
+        }
+        let states = &self.bodies.states;
+        let apart = self.joints.ignored_bodies();
+        let mut system = BodySystem::new(
+            states.iter().map(BodyState::in_solver).collect(),
+            states.iter().map(|state| state.parts.clone()).collect(),
+        );
+        self.collide_bodies_with_walls(&candidates, step, &mut system);
+        self.collide_bodies(&candidates, (step, &apart), &mut system);
+        self.collide_bodies_with_balls(&candidates, (step, &apart), &mut system);
+        system.contacts.sort_by_key(|contact| contact.key);
+        let before = &self.bodies.contacts;
+        for contact in &mut system.contacts {
+            if let Ok(known) = before.binary_search_by_key(&contact.key, |known| known.key) {
+                contact.take_impulses(&before[known]);
+            }
+        }
+        system
+    }
+
+    fn collide_bodies_with_walls(
+        &self,
+        candidates: &[BodyCandidate],
+        dt: f64,
+        system: &mut BodySystem,
+    ) {
+        let mut index_of_wall = BTreeMap::new();
+        for candidate in candidates {
+            let state = &self.bodies.states[candidate.row];
+            if state.asleep || !state.is_dynamic() {
+                continue;
+            }
+            let filter = CollisionFilter { layers: state.body.layers, ignored: &[] };
+            let mut near: Vec<SubShape> = self
+                .walls
+                .colliding_planes(filter)
+                .map(|(wall, _)| SubShape { wall, index: 0 })
+                .collect();
+            let bounds = Aabb {
+                min: cast_point(candidate.bounds.min),
+                max: cast_point(candidate.bounds.max),
+            };
+            self.walls.for_each_colliding(&bounds, filter, |part| near.push(part));
+            near.sort_unstable();
+            near.dedup();
+            let first = system.contacts.len();
+            let mut colliders = Vec::new();
+            for part in near {
+                let wall = *index_of_wall.entry(part.wall).or_insert_with(|| {
+                    let motion = self.walls.motion_of_row(part.wall as usize);
+                    let moves = self.walls.has_moved(part.wall as usize);
+                    system.bodies.push(SolverBody::wall(motion.map(WallMotion::cast), moves, dt));
+                    (system.bodies.len() - 1) as u32
+                });
+                let Some(collider) = self.wall_before(part, dt) else { continue };
+                let found = self.wall_contacts_of_body(part, candidate, wall, (&collider, dt), system);
+                system.contacts.extend(found);
+                colliders.resize(system.contacts.len() - first, collider);
+            }
+            drop_ghosts(&mut system.contacts, first, &colliders, state.reach * FLUSH);
+        }
+    }
+
+    /// Part of a wall where it is when a step of `dt` seconds begins.
+    fn wall_before(&self, part: SubShape, dt: f64) -> Option<WallCollider> {
+        let row = part.wall as usize;
+        let shape = &self.walls.shapes()[row];
+        match self.walls.motion_of_row(row).filter(|_| self.walls.has_moved(row)) {
+            Some(motion) => {
+                let before = shape.transformed(motion.pose_before(S::from_f64(dt))).ok()?;
+                before.sub_shape_f64(part.index)
+            }
+            None => shape.sub_shape_f64(part.index),
+        }
+    }
+
+    fn wall_contacts_of_body(
+        &self,
+        part: SubShape,
+        candidate: &BodyCandidate,
+        wall: u32,
+        (collider, dt): (&WallCollider, f64),
+        system: &BodySystem,
+    ) -> Vec<BodyContact> {
+        let row = part.wall as usize;
+        let state = &self.bodies.states[candidate.row];
+        let (Some(id), Some(body)) = (self.walls.id(row), self.bodies.id(candidate.row)) else {
+            return Vec::new();
+        };
+        let material = state.body.material.on_wall(self.walls.material_of_row(row)).cast();
+        let of_part = |at: usize| {
+            let bodies = [wall, candidate.row as u32];
+            let ends = bodies.map(|body| &system.bodies[body as usize]);
+            let shape = WallCollider::Solid(state.part(at));
+            let reach = ContactReach { margin: candidate.margin, slack: candidate.slack, dt };
+            let found = swept_manifold([collider, &shape], ends, reach)?;
+            let key =
+                ContactKey { partner: Partner::Wall(id), body, parts: [part.index, at as u32] };
+            Some(manifold_contact(key, bodies, &found, material))
+        };
+        (0..state.parts.len()).filter_map(of_part).collect()
+    }
+
+    fn collide_bodies(
+        &self,
+        candidates: &[BodyCandidate],
+        (dt, apart): (f64, &BTreeSet<[JointHeld; 2]>),
+        system: &mut BodySystem,
+    ) {
+        let tree = BodyCandidate::tree(candidates);
+        let states = &self.bodies.states;
+        for b in candidates {
+            let second = &states[b.row];
+            tree.for_each_in_box(&b.bounds, |a| {
+                let (a, first) = (&candidates[a as usize], &states[a as usize]);
+                let is_idle = |state: &BodyState<S>| state.asleep || !state.is_dynamic();
+                if a.row >= b.row
+                    || is_idle(first) && is_idle(second)
+                    || !first.body.layers.interacts_with(second.body.layers)
+                    || !apart.is_empty() && self.are_joined(a.row, b.row, apart)
+                {
+                    return;
+                }
+                self.collide_pair([a, b], dt, system);
+            });
+        }
+    }
+
+    /// Returns true if a joint keeps two bodies apart.
+    fn are_joined(&self, a: usize, b: usize, apart: &BTreeSet<[JointHeld; 2]>) -> bool {
+        let [Some(a), Some(b)] = [a, b].map(|row| self.bodies.id(row)) else { return false };
+        apart.contains(&[a.min(b), a.max(b)].map(JointHeld::Body))
+    }
+
+    fn collide_pair(&self, pair: [&BodyCandidate; 2], dt: f64, system: &mut BodySystem) {
+        let [first, second] = pair.map(|it| &self.bodies.states[it.row]);
+        let [Some(a), Some(b)] = pair.map(|it| self.bodies.id(it.row)) else { return };
+        let margin = pair[0].margin + pair[1].margin;
+        let reach = ContactReach { margin, slack: pair[0].slack.min(pair[1].slack), dt };
+        let material = first.body.material.combined_with(second.body.material).cast();
+        let bodies = pair.map(|it| it.row as u32);
+        let ends = bodies.map(|body| system.bodies[body as usize]);
+        for i in 0..first.parts.len() {
+            let one = first.part(i);
+            let bounds = grown(&one.bounding_box(), margin);
+            let one = WallCollider::Solid(one);
+            for j in 0..second.parts.len() {
+                let other = second.part(j);
+                if !bounds.overlaps(&other.bounding_box()) {
+                    continue;
+                }
+                let shapes = [&one, &WallCollider::Solid(other)];
+                let Some(found) = swept_manifold(shapes, ends.each_ref(), reach) else { continue };
+                let parts = [i as u32, j as u32];
+                let key = ContactKey { partner: Partner::Body(a), body: b, parts };
+                system.contacts.push(manifold_contact(key, bodies, &found, material));
+            }
+        }
+    }
+
+    /// Visits balls and the bodies near which they come in `dt` seconds, with how far each ball goes in it.
+    pub(super) fn visit_balls_near_bodies(
+        &self,
+        candidates: &[BodyCandidate],
+        dt: f64,
+        mut visit: impl FnMut(&BallView<S>, usize, f64),
+    ) {
+        let Some(all) = candidates.iter().map(|it| it.bounds).reduce(|all, it| all.union(&it))
+        else {
+            return;
+        };
+        let tree = BodyCandidate::tree(candidates);
+        self.swarm.visit_balls(|ball| {
+            let speed = cast_vector::<S, f64>(ball.velocity).magnitude();
+            let way = speed * dt + MARGIN * ball.radius();
+            let bounds = grown(&Aabb { min: ball.center(), max: ball.center() }, ball.radius() + way);
+            if all.overlaps(&bounds) {
+                tree.for_each_in_box(&bounds, |row| {
+                    let row = row as usize;
+                    if self.bodies.states[row].body.layers.interacts_with(ball.layers) {
+                        visit(&ball, row, way);
+                    }
+                });
+            }
+        });
+    }
+
+    fn collide_bodies_with_balls(
+        &self,
+        candidates: &[BodyCandidate],
+        (dt, apart): (f64, &BTreeSet<[JointHeld; 2]>),
+        system: &mut BodySystem,
+    ) {
+        self.visit_balls_near_bodies(candidates, dt, |ball, row, way| {
+            let state = &self.bodies.states[row];
+            let Some(body) = self.bodies.id(row) else { return };
+            let marble = || {
+                let slots = &self.scratch.soft_step.marble_of_slot;
+                self.marbles.id(*slots.get(ball.slot as usize)? as usize)
+            };
+            if !apart.is_empty()
+                && marble().is_some_and(|marble| {
+                    apart.contains(&[JointHeld::Marble(marble), JointHeld::Body(body)])
+                })
+            {
+                return;
+            }
+            let local = state.solver.pose.inverse_transform_point(ball.center());
+            let reach = ball.radius() + candidates[row].margin + way;
+            for (part, shape) in (0..).zip(state.parts.iter()) {
+                if shape.project_point(local).distance > reach {
+                    continue;
+                }
+                let known = system.bodies.last().is_some_and(|last| last.slot == ball.slot);
+                if !known {
+                    system.bodies.push(SolverBody::ball(ball.slot));
+                }
+                let bodies = [(system.bodies.len() - 1) as u32, row as u32];
+                let key = ContactKey { partner: Partner::Ball(ball.slot), body, parts: [0, part] };
+                let material = ball.material.combined_with(state.body.material).cast();
+                system.contacts.push(ball_contact(key, bodies, ball.radius(), material));
+            }
+        });
+    }
+}
+
+/// Drops contacts of a body, from index `first` on, all of whose points are on another wall that it touches:
+/// those at the seams of tiles and meshes.
+fn drop_ghosts(
+    contacts: &mut Vec<BodyContact>,
+    first: usize,
+    colliders: &[WallCollider],
+    flush: f64,
+) {
+    if contacts.len() - first < 2 {
+        return;
+    }
+    let found = &contacts[first..];
+    let is_on = |point: Vec3<f64>, collider: &WallCollider| {
+        let point = Point3::from_vec(point);
+        let distance = match collider {
+            WallCollider::Plane { normal, offset } => point.to_vec().dot(*normal) - offset,
+            WallCollider::Solid(shape) => shape.project_point(point).distance,
+            WallCollider::Triangle(triangle) | WallCollider::OneSidedTriangle(triangle, _) => {
+                triangle.project_point(point).distance
+            }
+        };
+        distance.abs() <= flush
+    };
+    let lies_on = |contact: &BodyContact, other: usize| {
+        contact.points.iter().all(|point| is_on(point.place, &colliders[other]))
+    };
+    let is_ghost = |at: usize| {
+        found.iter().enumerate().any(|(other, by)| {
+            by.normal.dot(found[at].normal) < PARALLEL
+                && lies_on(&found[at], other)
+                && !lies_on(by, at)
+        })
+    };
+    let mut ghosts = (0..found.len()).map(is_ghost).collect::<Vec<_>>().into_iter();
+    let mut at = 0;
+    contacts.retain(|_| {
+        at += 1;
+        at <= first || !ghosts.next().unwrap_or(false)
+    });
+}
