@@ -6,6 +6,7 @@
 //! parts (`contact.rs`), solved as soft contacts in small steps (`solve.rs`; Catto, `Solver2D`, 2024). All numbers of the solver are `f64`, also in
 //! a world of `f32`.
 
+mod bounce;
 mod contact;
 mod list;
 mod solve;

@@ -13,13 +13,16 @@ use crate::constraint::{ContactImpulse, ContactSoftness, FrictionCone, Softness}
 use crate::math::Vec3;
 use crate::shape::any_perpendicular;
 
-/// Sweeps at most over the points of one contact, which are solved together.
-const MAX_SWEEPS: u32 = 12;
-/// Change of an impulse over the largest of the contact, by which its points count as solved.
-const SOLVED: f64 = 1e-3;
+/// How long the points of one contact, which are solved together, are swept over: until no impulse changes by more
+/// than this part of the largest, and at most so often.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sweeps {
+    pub solved: f64,
+    pub most: u32,
+}
 
-/// Target speed of each point along the normal; none of those that are not solved.
-type Targets = SmallVec<[Option<f64>; 4]>;
+/// Sweeps in each pass: the next one goes on.
+const IN_PASS: Sweeps = Sweeps { solved: 1e-3, most: 12 };
 
 /// Numbers of a substep.
 #[derive(Clone, Copy, Debug)]
@@ -35,12 +38,12 @@ pub(super) struct SubstepParams {
 /// most, since friction that is limited has the direction of the slip.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EffectiveMass {
-    normal: f64,
-    tangent: f64,
+    pub normal: f64,
+    pub tangent: f64,
 }
 
 impl EffectiveMass {
-    fn of(contact: &BodyContact, point: &BodyContactPoint, bodies: &[SolverBody]) -> Self {
+    pub fn of(contact: &BodyContact, point: &BodyContactPoint, bodies: &[SolverBody]) -> Self {
         let ends = contact.bodies.map(|body| &bodies[body as usize]);
         let give = |one: Vec3<f64>, other: Vec3<f64>| -> f64 {
             let along = |(body, arm): (&SolverBody, Vec3<f64>)| {
@@ -84,57 +87,32 @@ impl BodyContact {
         }
     }
 
-    /// Lets points bounce that meet in this substep. Returns true if any did.
-    pub(super) fn bounce(&mut self, bodies: &mut [SolverBody], params: &SubstepParams) -> bool {
-        let restitution = self.material.restitution;
-        self.note_approach(bodies);
-        let meets = |point: &BodyContactPoint| {
-            point.approach < -params.threshold
-                && point.separation + point.approach * params.h <= 0.0
-        };
-        if restitution == 0.0 || !self.points.iter().any(meets) {
-            return false;
-        }
-        let targets: Targets =
-            self.points.iter().map(|it| meets(it).then_some(-it.approach * restitution)).collect();
-        // The impulse of the impact is not the load of the contact.
-        let loads: SmallVec<[_; 4]> = self.points.iter().map(|point| point.impulse).collect();
-        for point in &mut self.points {
-            point.impulse = ContactImpulse::zero();
-        }
-        self.sweep(bodies, |_, at| targets[at].map(|target| (target, None)));
-        for (point, load) in self.points.iter_mut().zip(loads) {
-            point.total += point.impulse.normal;
-            point.impulse = load;
-        }
-        true
-    }
-
     /// Solves all points; softly before positions move on, rigidly after that.
     pub(super) fn solve(&mut self, bodies: &mut [SolverBody], params: &SubstepParams, soft: bool) {
         let per_second = 1.0 / params.h;
-        self.sweep(bodies, |contact, at| {
-            let BodyContactPoint { separation, impulse, .. } = contact.points[at];
+        self.sweep(bodies, IN_PASS, |contact, at| {
+            let BodyContactPoint { separation, impulse, approach, .. } = contact.points[at];
             if soft {
                 let (target, softness) = params.softness.at(separation, per_second);
                 return Some((target, Some(softness)));
             }
-            // What did not touch yet may bounce in the next substep.
-            let touches = separation <= 0.0 || impulse.normal > 0.0;
-            touches.then(|| (-separation.max(0.0) * per_second, None))
+            // What comes fast and did not touch yet may bounce in the next substep.
+            let comes = impulse.normal == 0.0 && approach < -params.threshold;
+            (!comes).then(|| (-separation.max(0.0) * per_second, None))
         });
     }
 
     /// Solves points until they agree; `target` is the speed of each along the normal, if it is to be solved, and
     /// its softness.
-    fn sweep(
+    pub(super) fn sweep(
         &mut self,
         bodies: &mut [SolverBody],
+        until: Sweeps,
         target: impl Fn(&Self, usize) -> Option<(f64, Option<Softness<f64>>)>,
     ) {
         let masses: SmallVec<[EffectiveMass; 4]> =
             self.points.iter().map(|point| EffectiveMass::of(self, point, bodies)).collect();
-        let sweeps = if self.points.len() > 1 { MAX_SWEEPS } else { 1 };
+        let sweeps = if self.points.len() > 1 { until.most } else { 1 };
         for _ in 0..sweeps {
             let (mut change, mut largest) = (0.0_f64, 0.0_f64);
             for (at, mass) in masses.iter().enumerate() {
@@ -143,7 +121,7 @@ impl BodyContact {
                 change = change.max(by.abs());
                 largest = largest.max(self.points[at].impulse.normal);
             }
-            if change <= largest * SOLVED {
+            if change <= largest * until.solved {
                 break;
             }
         }
@@ -170,7 +148,7 @@ impl BodyContact {
         change.normal
     }
 
-    fn apply(
+    pub(super) fn apply(
         &self,
         point: &BodyContactPoint,
         impulse: ContactImpulse<f64>,

@@ -44,14 +44,14 @@ impl BodySystem {
     /// approach by less than `threshold` m/s do not bounce.
     pub fn begin_substep(&mut self, h: f64, threshold: f64, softness: ContactSoftness<f64>) {
         self.params = Some(SubstepParams { h, threshold, softness });
-        for body in &mut self.bodies {
-            body.accelerate(h);
-        }
         self.update_contacts(h);
         for contact in &mut self.contacts {
             contact.forget_impacts(threshold);
         }
         self.bounce();
+        for body in &mut self.bodies {
+            body.accelerate(h);
+        }
         for contact in &mut self.contacts {
             contact.note_approach(&self.bodies);
         }

@@ -5,9 +5,9 @@ use super::*;
 use taw::shape::{Capsule, Compound, Hull, Obb, Sphere};
 use taw::world::Marble;
 
-struct Scene {
-    world: World<f32>,
-    half: f64,
+pub struct Scene {
+    pub world: World<f32>,
+    pub half: f64,
 }
 
 fn unit(random: &mut fastrand::Rng, low: f64, high: f64) -> f64 {
@@ -49,7 +49,7 @@ fn any_shape(random: &mut fastrand::Rng) -> Shape<f32> {
     Shape::Compound(Compound::new(vec![first, second.transformed(beside)]).unwrap())
 }
 
-fn scene(seed: u64) -> Scene {
+pub fn scene(seed: u64) -> Scene {
     let mut random = fastrand::Rng::with_seed(seed);
     let half = unit(&mut random, 0.8, 1.5);
     let mut world = world::<f32>(false);
@@ -90,7 +90,8 @@ fn judge(seed: u64) -> Result<(f64, f64), String> {
     let of_bodies = world.bodies.ids().map(|id| {
         f64::from(world.bodies.mass_properties(id).unwrap().unwrap().mass)
     });
-    let of_marbles = world.marbles.ids().map(|id| {
+    let marbles = (0..world.marbles.len()).filter_map(|row| world.marbles.id(row));
+    let of_marbles = marbles.map(|id| {
         let marble = world.marbles.get(id).unwrap();
         f64::from(marble.mass.of(marble.radius))
     });
