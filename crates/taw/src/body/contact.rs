@@ -93,7 +93,14 @@ pub(crate) fn manifold_contact(
         let offset = point.distance - (cores[1] - cores[0]).dot(normal);
         BodyContactPoint { feature: point.feature, offset, place, ..BodyContactPoint::new(anchors) }
     };
-    BodyContact { key, bodies, normal, material, radii, points: manifold.points.iter().map(point).collect() }
+    BodyContact {
+        key,
+        bodies,
+        normal,
+        material,
+        radii,
+        points: manifold.points.iter().map(point).collect(),
+    }
 }
 
 /// Contact of a ball of this radius and a part of a body, which is found anew in each substep.

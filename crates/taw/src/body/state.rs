@@ -161,7 +161,8 @@ impl SolverBody {
     /// Sets its angular momentum along its principal axes, and the spin by it.
     pub fn set_body_momentum(&mut self, momentum: Vec3<f64>) {
         self.momentum = Some(momentum);
-        let local = momentum.zip(self.moments, |l, moment| if moment > 0.0 { l / moment } else { 0.0 });
+        let local =
+            momentum.zip(self.moments, |l, moment| if moment > 0.0 { l / moment } else { 0.0 });
         self.spin = self.pose.transform_vector(local);
     }
 

@@ -122,11 +122,12 @@ impl BodySystem {
 
     /// Slots of the balls that bodies bear in this substep.
     pub fn borne_balls(&self) -> impl Iterator<Item = u32> + '_ {
-        self.contacts.iter().filter(|contact| contact.presses()).filter_map(|contact| {
-            match contact.key.partner {
-                Partner::Ball(slot) => Some(slot),
-                _ => None,
-            }
+        self.contacts.iter().filter(|contact| contact.presses()).filter_map(|contact| match contact
+            .key
+            .partner
+        {
+            Partner::Ball(slot) => Some(slot),
+            _ => None,
         })
     }
 
@@ -188,7 +189,12 @@ impl BodyContact {
 }
 
 /// Time at which a ball that goes this way meets a convex shape that stands, as a fraction of the way.
-fn time_to_part(center: Point3<f64>, radius: f64, part: &Shape<f64>, way: Vec3<f64>) -> Option<f64> {
+fn time_to_part(
+    center: Point3<f64>,
+    radius: f64,
+    part: &Shape<f64>,
+    way: Vec3<f64>,
+) -> Option<f64> {
     let ball = Sphere { center, radius };
     let still = Vec3::zero();
     as_convex(part).and_then(|part| shape_cast(part, still, &ball, way)).map(|hit| hit.time)

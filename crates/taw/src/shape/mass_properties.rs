@@ -5,7 +5,9 @@ use cgmath::{EuclideanSpace, InnerSpace, Matrix, One, SquareMatrix, Zero};
 use super::{Capsule, Hull, Obb, Shape, Sphere};
 use crate::Error;
 use crate::error::{finite_point, positive, rotation};
-use crate::math::{Mat3, Point3, Quat, Scalar, Vec3, cast_point, cast_vector, normalize_and_length};
+use crate::math::{
+    Mat3, Point3, Quat, Scalar, Vec3, cast_point, cast_vector, normalize_and_length,
+};
 
 /// Moment of inertia of a solid ball of uniform density, over its mass and the square of its radius.
 pub(crate) const BALL_INERTIA: f64 = 0.4;
@@ -59,7 +61,8 @@ impl<S: Scalar> MassProperties<S> {
     /// Mass properties of several parts in the frame of one body, each with its own density; none of no parts.
     #[must_use]
     pub fn sum(parts: &[Self]) -> Option<Self> {
-        let sum = parts.iter().map(|part| Moments::of_properties(&part.cast())).reduce(Moments::plus)?;
+        let sum =
+            parts.iter().map(|part| Moments::of_properties(&part.cast())).reduce(Moments::plus)?;
         Some(sum.properties().cast())
     }
 
@@ -155,11 +158,8 @@ impl Moments {
         let (axis, long) = normalize_and_length(b - a).unwrap_or((Vec3::unit_y(), 0.0));
         let ball = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
         let volume = ball + std::f64::consts::PI * radius * radius * long;
-        let [axial, transverse] = if *radius > 0.0 {
-            capsule_unit_inertia(*radius, 0.5 * long)
-        } else {
-            [0.0; 2]
-        };
+        let [axial, transverse] =
+            if *radius > 0.0 { capsule_unit_inertia(*radius, 0.5 * long) } else { [0.0; 2] };
         let inertia = Mat3::from_value(transverse) + square(axis) * (axial - transverse);
         Self::of_inertia(volume, a + (b - a) * 0.5, inertia * volume)
     }
@@ -239,7 +239,8 @@ fn principal_axes(mut matrix: Mat3<f64>) -> (Vec3<f64>, Quat<f64>) {
     let mut axes = Quat::one();
     for _ in 0..MAX_ROTATIONS {
         let off = [[0, 1], [0, 2], [1, 2]].map(|[i, j]: [usize; 2]| (matrix[i][j].abs(), i, j));
-        let (largest, i, j) = off.into_iter().fold((0.0, 0, 1), |a, b| if b.0 > a.0 { b } else { a });
+        let (largest, i, j) =
+            off.into_iter().fold((0.0, 0, 1), |a, b| if b.0 > a.0 { b } else { a });
         if largest <= f64::EPSILON * matrix.trace().abs() {
             break;
         }
@@ -259,7 +260,6 @@ fn principal_axes(mut matrix: Mat3<f64>) -> (Vec3<f64>, Quat<f64>) {
     }
     (matrix.diagonal(), axes)
 }
-
 
 #[cfg(test)]
 mod tests {

@@ -2,9 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use cgmath::{EuclideanSpace, InnerSpace};
+use cgmath::InnerSpace;
 
 use super::World;
+use super::body_seams::drop_ghosts;
 use super::joints::JointHeld;
 use super::swept_manifold::{ContactReach, swept_manifold};
 use super::walls::SubShape;
@@ -13,7 +14,7 @@ use crate::body::{
     manifold_contact,
 };
 use crate::broad::CollisionFilter;
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
+use crate::math::{Scalar, Vec3, cast_point, cast_vector};
 use crate::motion::WallMotion;
 use crate::response::event::WallCollider;
 use crate::shape::{Aabb, Aabb3, BoundedShape, Bvh};
@@ -23,8 +24,6 @@ use crate::swarm::BallView;
 const MARGIN: f64 = 0.02;
 /// Distance from another wall within which a point counts as on it, over the reach of the body.
 const FLUSH: f64 = 0.01;
-/// Cosine of the angle between two normals from which on they count as one.
-const PARALLEL: f64 = 0.99;
 
 /// Body with the boxes in which its parts stay in the step.
 pub(super) struct BodyCandidate {
@@ -130,7 +129,8 @@ impl<S: Scalar> World<S> {
                     (system.bodies.len() - 1) as u32
                 });
                 let Some(collider) = self.wall_before(part, dt) else { continue };
-                let found = self.wall_contacts_of_body(part, candidate, wall, (&collider, dt), system);
+                let found =
+                    self.wall_contacts_of_body(part, candidate, wall, (&collider, dt), system);
                 system.contacts.extend(found);
                 colliders.resize(system.contacts.len() - first, collider);
             }
@@ -250,7 +250,8 @@ impl<S: Scalar> World<S> {
         self.swarm.visit_balls(|ball| {
             let speed = cast_vector::<S, f64>(ball.velocity).magnitude();
             let way = speed * dt + MARGIN * ball.radius();
-            let bounds = grown(&Aabb { min: ball.center(), max: ball.center() }, ball.radius() + way);
+            let bounds =
+                grown(&Aabb { min: ball.center(), max: ball.center() }, ball.radius() + way);
             if all.overlaps(&bounds) {
                 tree.for_each_in_box(&bounds, |row| {
                     let row = row as usize;
@@ -299,45 +300,4 @@ impl<S: Scalar> World<S> {
             }
         });
     }
-}
-
-/// Drops contacts of a body, from index `first` on, all of whose points are on another wall that it touches:
-/// those at the seams of tiles and meshes.
-fn drop_ghosts(
-    contacts: &mut Vec<BodyContact>,
-    first: usize,
-    colliders: &[WallCollider],
-    flush: f64,
-) {
-    if contacts.len() - first < 2 {
-        return;
-    }
-    let found = &contacts[first..];
-    let is_on = |point: Vec3<f64>, collider: &WallCollider| {
-        let point = Point3::from_vec(point);
-        let distance = match collider {
-            WallCollider::Plane { normal, offset } => point.to_vec().dot(*normal) - offset,
-            WallCollider::Solid(shape) => shape.project_point(point).distance,
-            WallCollider::Triangle(triangle) | WallCollider::OneSidedTriangle(triangle, _) => {
-                triangle.project_point(point).distance
-            }
-        };
-        distance.abs() <= flush
-    };
-    let lies_on = |contact: &BodyContact, other: usize| {
-        contact.points.iter().all(|point| is_on(point.place, &colliders[other]))
-    };
-    let is_ghost = |at: usize| {
-        found.iter().enumerate().any(|(other, by)| {
-            by.normal.dot(found[at].normal) < PARALLEL
-                && lies_on(&found[at], other)
-                && !lies_on(by, at)
-        })
-    };
-    let mut ghosts = (0..found.len()).map(is_ghost).collect::<Vec<_>>().into_iter();
-    let mut at = 0;
-    contacts.retain(|_| {
-        at += 1;
-        at <= first || !ghosts.next().unwrap_or(false)
-    });
 }

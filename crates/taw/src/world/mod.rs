@@ -2,6 +2,7 @@
 
 mod bodies;
 mod body_contacts;
+mod body_seams;
 mod changed_rows;
 mod contact_impulses;
 mod contact_limit;

@@ -3,7 +3,9 @@
 use cgmath::InnerSpace;
 
 use crate::body::{SolverBody, SweptManifold};
-use crate::contact::{Convex, Manifold, Sweep, as_convex, manifold, manifold_of_plane, time_of_impact};
+use crate::contact::{
+    Convex, Manifold, Sweep, as_convex, manifold, manifold_of_plane, time_of_impact,
+};
 use crate::frame::Pose;
 use crate::response::event::WallCollider;
 use crate::shape::{Plane, Shape, Triangle};
@@ -57,10 +59,7 @@ fn rounding(shape: &Shape<f64>) -> f64 {
 }
 
 /// Manifold of a collider and a convex part, and the radii around their cores.
-fn manifold_of(
-    [one, other]: [&WallCollider; 2],
-    margin: f64,
-) -> Option<(Manifold<f64>, [f64; 2])> {
+fn manifold_of([one, other]: [&WallCollider; 2], margin: f64) -> Option<(Manifold<f64>, [f64; 2])> {
     let WallCollider::Solid(shape) = other else { return None };
     let part = as_convex(shape)?;
     let (found, radius) = match one {

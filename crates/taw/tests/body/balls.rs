@@ -9,8 +9,7 @@ fn a_ball_and_a_box_collide_as_equals() {
         let mut world = world::<f32>(false);
         world.set_gravity(vector(0.0, 0.0, 0.0)).unwrap();
         let elastic = material(0.0, 1.0);
-        let body =
-            Body { material: elastic, ..cuboid([0.2, 0.2, 0.2], point(1.0, 0.0, 0.0)) };
+        let body = Body { material: elastic, ..cuboid([0.2, 0.2, 0.2], point(1.0, 0.0, 0.0)) };
         let body = world.bodies.insert(body).unwrap();
         let marble = Marble {
             velocity: vector(3.0, 0.0, 0.0),
@@ -25,7 +24,11 @@ fn a_ball_and_a_box_collide_as_equals() {
         let ball = world.marbles.get(marble).unwrap().velocity.map(f64::from);
         let momentum = ball * m + velocity(&world, body) * n;
         assert!((momentum - Vec3::new(60.0, 0.0, 0.0)).magnitude() < 1e-3, "{momentum:?}");
-        assert!((energy(&world) / start - 1.0).abs() < 1e-3, "{offset}: {}", energy(&world) / start);
+        assert!(
+            (energy(&world) / start - 1.0).abs() < 1e-3,
+            "{offset}: {}",
+            energy(&world) / start
+        );
         if offset == 0.0 {
             let expected = 3.0 * (m - n) / (m + n);
             assert!((ball.x - expected).abs() < 1e-3, "{ball:?}, not {expected}");
@@ -81,7 +84,8 @@ fn nothing_passes_through_a_body() {
             ..cuboid([0.01, 1.0, 1.0], point(1.0, 0.0, 0.0))
         };
         world.bodies.insert(plate).unwrap();
-        let thrown = Marble { velocity: vector(speed, 0.0, 0.0), ..Marble::new(point(0.0, 0.0, 0.0), 0.02) };
+        let thrown =
+            Marble { velocity: vector(speed, 0.0, 0.0), ..Marble::new(point(0.0, 0.0, 0.0), 0.02) };
         let ball = world.marbles.insert(thrown).unwrap();
         let body = Body {
             velocity: vector(speed, 0.0, 0.0),

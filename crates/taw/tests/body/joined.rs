@@ -85,10 +85,8 @@ fn motors_and_limits_of_bodies() {
     let motor = Some(JointMotor::Speed { target: 3.0, max: 1e4 });
     world.joints.insert(Joint::new(hinge(JointDrive { motor, limits: None }), ends)).unwrap();
     let door = world.bodies.insert(cuboid([0.5, 0.05, 0.05], point(2.5, 0.0, 0.0))).unwrap();
-    let ends = [
-        JointEnd::world(point(2.0, 0.0, 0.0)),
-        JointEnd::body(door, vector(-0.5, 0.0, 0.0)),
-    ];
+    let ends =
+        [JointEnd::world(point(2.0, 0.0, 0.0)), JointEnd::body(door, vector(-0.5, 0.0, 0.0))];
     let limits = Some([-0.5, 0.5]);
     world.joints.insert(Joint::new(hinge(JointDrive { motor: None, limits }), ends)).unwrap();
     run(&mut world, 5.0);

@@ -12,7 +12,13 @@ fn scratch_slide() {
         let v = velocity(&world, id);
         step(&mut world);
         let w = velocity(&world, id);
-        println!("{i} dv {:?} over g mu dt {} y {} spin {:?}", w - v, (w - v).x / (9.81 * 0.4 / 60.0), place(&world, id).y, spin(&world, id));
+        println!(
+            "{i} dv {:?} over g mu dt {} y {} spin {:?}",
+            w - v,
+            (w - v).x / (9.81 * 0.4 / 60.0),
+            place(&world, id).y,
+            spin(&world, id)
+        );
     }
 }
 #[test]
@@ -26,7 +32,13 @@ fn scratch_bounce() {
     let id = world.bodies.insert(body).unwrap();
     for i in 0..50 {
         step(&mut world);
-        println!("{i} E {} v {:?} w {:?} y {}", energy(&world), velocity(&world, id), spin(&world, id), place(&world, id).y);
+        println!(
+            "{i} E {} v {:?} w {:?} y {}",
+            energy(&world),
+            velocity(&world, id),
+            spin(&world, id),
+            place(&world, id).y
+        );
     }
 }
 #[test]
@@ -45,25 +57,35 @@ fn scratch_ball() {
     let marble = world.marbles.insert(marble).unwrap();
     for i in 0..22 {
         step(&mut world);
-        println!("{i} {:?} {:?}", world.marbles.get(marble).unwrap().velocity, velocity(&world, body));
+        println!(
+            "{i} {:?} {:?}",
+            world.marbles.get(marble).unwrap().velocity,
+            velocity(&world, body)
+        );
     }
 }
 #[test]
 fn scratch_stack() {
     for n in [10, 2] {
-    let mut world = world::<f32>(true);
-    let mut ids = Vec::new();
-    for i in 0..n {
-        let at = point(0.0, 0.1 + 0.2 * f64::from(i), 0.0);
-        let mut body = Body { sleeping_disabled: true, ..cuboid([0.1, 0.1, 0.1], at) };
-        if n == 2 && i == 1 { body.mass = taw::body::BodyMass::Uniform(Mass::Density(100000.0)); }
-        ids.push(world.bodies.insert(body).unwrap());
-    }
-    for t in 0..20 {
-        run(&mut world, 1.0);
-        let sink: Vec<_> = ids.iter().enumerate().map(|(i, id)| ((place(&world, *id).y - 0.1 - 0.2 * i as f64) * 1e6).round()).collect();
-        println!("{t} {sink:?} {:?}", (place(&world, ids[n as usize - 1]).x));
-    }
+        let mut world = world::<f32>(true);
+        let mut ids = Vec::new();
+        for i in 0..n {
+            let at = point(0.0, 0.1 + 0.2 * f64::from(i), 0.0);
+            let mut body = Body { sleeping_disabled: true, ..cuboid([0.1, 0.1, 0.1], at) };
+            if n == 2 && i == 1 {
+                body.mass = taw::body::BodyMass::Uniform(Mass::Density(100000.0));
+            }
+            ids.push(world.bodies.insert(body).unwrap());
+        }
+        for t in 0..20 {
+            run(&mut world, 1.0);
+            let sink: Vec<_> = ids
+                .iter()
+                .enumerate()
+                .map(|(i, id)| ((place(&world, *id).y - 0.1 - 0.2 * i as f64) * 1e6).round())
+                .collect();
+            println!("{t} {sink:?} {:?}", (place(&world, ids[n as usize - 1]).x));
+        }
     }
 }
 #[test]
@@ -72,15 +94,30 @@ fn scratch_fall() {
     let id = world.bodies.insert(cuboid([0.1, 0.1, 0.1], point(0.0, 0.3, 0.0))).unwrap();
     for t in 0..90 {
         step(&mut world);
-        println!("{t} {:?} up {} v {:?} w {:?} {}", place(&world, id), upright(&world, id), velocity(&world, id), spin(&world, id), world.bodies.is_asleep(id).unwrap());
+        println!(
+            "{t} {:?} up {} v {:?} w {:?} {}",
+            place(&world, id),
+            upright(&world, id),
+            velocity(&world, id),
+            spin(&world, id),
+            world.bodies.is_asleep(id).unwrap()
+        );
     }
 }
 #[test]
 fn scratch_random() {
-    for seed in [583u64, 513, 139] {
+    for seed in [740u64, 139] {
         let random::Scene { mut world, half } = random::scene(seed);
-        println!("seed {seed} half {half} bodies {} marbles {} g {:?}", world.bodies.len(), world.marbles.len(), world.gravity());
-        for id in world.bodies.ids() { let b = world.bodies.get(id).unwrap(); println!("{:?} {:?}", b.shape, b.material); }
+        println!(
+            "seed {seed} half {half} bodies {} marbles {} g {:?}",
+            world.bodies.len(),
+            world.marbles.len(),
+            world.gravity()
+        );
+        for id in world.bodies.ids() {
+            let b = world.bodies.get(id).unwrap();
+            println!("{:?} {:?}", b.shape, b.material);
+        }
         let mut last = energy(&world);
         for t in 0..240 {
             let before = world.clone();
@@ -96,9 +133,19 @@ fn scratch_random() {
                 println!("{t}: {last} -> {now} out {out}");
                 for id in world.bodies.ids() {
                     let (b, c) = (before.bodies.get(id).unwrap(), world.bodies.get(id).unwrap());
-                    println!("   at {:?} v {:?} w {:?}\n     {:?} v {:?} w {:?}", b.position, b.velocity, b.angular_velocity, c.position, c.velocity, c.angular_velocity);
+                    println!(
+                        "   at {:?} v {:?} w {:?}\n     {:?} v {:?} w {:?}",
+                        b.position,
+                        b.velocity,
+                        b.angular_velocity,
+                        c.position,
+                        c.velocity,
+                        c.angular_velocity
+                    );
                 }
-                if out > -0.01 { break; }
+                if out > -0.01 {
+                    break;
+                }
             }
             last = now;
         }
