@@ -35,6 +35,7 @@ use bevy_transform_interpolation::TransformEasingSystems;
 use bevy_transform_interpolation::prelude::*;
 
 use crate::TawSystems;
+use crate::body::Body;
 use crate::components::{Eased, Marble, MarbleState, Teleport, bits, rotation_bits};
 use crate::convert::{from_point, from_rotation, to_point, to_rotation};
 use crate::resources::TawWorld;
@@ -59,6 +60,7 @@ impl Plugin for TawInterpolationPlugin {
         if !app.is_plugin_added::<TransformInterpolationPlugin>() {
             app.add_plugins(TransformInterpolationPlugin::default());
         }
+        app.register_required_components::<Body, TransformInterpolation>();
         // That crate eases what it is told to in its parent's frame, which may move by itself.
         app.register_required_components::<Marble, Eased>();
         app.register_required_components::<Marble, NoTranslationEasing>();

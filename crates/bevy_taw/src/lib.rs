@@ -161,6 +161,7 @@
 
 mod ball;
 mod ball_sensor;
+pub mod body;
 pub mod components;
 pub mod contact_force;
 mod contact_points;
@@ -181,6 +182,7 @@ pub mod grounded;
 pub mod ignore;
 pub mod ignored;
 pub mod interpolation;
+pub mod joint;
 pub mod layers;
 #[cfg(feature = "mesh")]
 pub mod mesh_walls;
@@ -218,6 +220,7 @@ pub use taw;
 
 /// Items that nearly every game needs.
 pub mod prelude {
+    pub use crate::body::{Body, BodyPart, BodyShape};
     pub use crate::components::{
         AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Kinematic,
         Marble, MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping,
@@ -230,6 +233,9 @@ pub mod prelude {
     pub use crate::grounded::{Ground, Grounded};
     pub use crate::ignore::{ColliderDisabled, IgnoreCollisions, OneWay};
     pub use crate::ignored::IgnoredComponents;
+    pub use crate::joint::{
+        Joint, JointBroken, JointDrive, JointEnd, JointKind, JointMotor, JointSpring,
+    };
     pub use crate::layers::{CollisionLayers, LayerMask, PhysicsLayer};
     #[cfg(feature = "mesh")]
     pub use crate::mesh_walls::{MeshShape, MeshWalls};

@@ -3,6 +3,7 @@ use bevy::ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
 use bevy::prelude::*;
 use bevy_transform_interpolation::TransformEasingSystems;
 
+use crate::body::Body;
 use crate::components::{
     AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Kinematic, Marble,
     MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
@@ -16,6 +17,7 @@ use crate::grounded::Grounded;
 use crate::ignore::{self, ColliderDisabled, IgnoreCollisions, OneWay};
 use crate::ignored::{self, IgnoredComponents};
 use crate::interpolation::TawInterpolationPlugin;
+use crate::joint::{Joint, JointBroken};
 use crate::layers::CollisionLayers;
 use crate::pair_filter::{self, FilterPairs, FilteredPairs};
 use crate::refusal::{self, InputRefused, MarbleStopped, Refusals, Told, report};
@@ -28,8 +30,8 @@ use crate::touches::{self, Touches};
 use crate::wall::Wall;
 use crate::zones::{GravityZone, WindZone, ZoneGravity};
 use crate::{
-    ball_sensor, contact_force, controller, forget, gather, gather_walls, grounded, scatter,
-    sensor, sleep, zones,
+    ball_sensor, body, contact_force, controller, forget, gather, gather_walls, grounded, joint,
+    scatter, sensor, sleep, zones,
 };
 
 /// Everything: the physics, interpolation between its steps, and with the feature
@@ -152,7 +154,8 @@ impl Plugin for TawPlugin {
             .init_resource::<gather_walls::FrameTime>()
             .add_message::<InputRefused>()
             .add_message::<RowRemoved>()
-            .add_message::<MarbleStopped>();
+            .add_message::<MarbleStopped>()
+            .add_message::<JointBroken>();
         app.register_type::<(Marble, Velocity, AngularVelocity, MarbleMass, GravityScale)>()
             .register_type::<(MarbleDamping, ExternalForce, ExternalImpulse)>()
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
@@ -160,7 +163,7 @@ impl Plugin for TawPlugin {
             .register_type::<(Grounded, ContactForce, MarbleController, GravityZone, WindZone)>()
             .register_type::<(IgnoreCollisions, ColliderDisabled, OneWay, FilterPairs)>()
             .register_type::<(TawModel, TawSwarmModel, Gravity, Forces, IgnoredComponents)>()
-            .register_type::<(SubstepDelta, SurfaceVelocity, Swarm)>();
+            .register_type::<(SubstepDelta, SurfaceVelocity, Swarm, Body, Joint)>();
         diagnostics::register(app);
         sensor::register(app);
         observe(app);
@@ -186,7 +189,9 @@ fn observe(app: &mut App) {
         .add_observer(gather::note_lost_component::<ChildOf>)
         .add_observer(forget::forget_marble)
         .add_observer(forget::forget_wall)
-        .add_observer(swarm::forget);
+        .add_observer(swarm::forget)
+        .add_observer(body::forget)
+        .add_observer(joint::forget);
     app.add_systems(
         PostUpdate,
         scatter::stay.run_if(scatter::any_child).before(TransformSystems::Propagate),
@@ -261,6 +266,9 @@ fn add_gather(app: &mut App) {
                 .chain()
                 .run_if(pair_filter::any),
             ignore::gather.run_if(ignore::any),
+            body::gather.run_if(any_with_component::<Body>),
+            body::forces.run_if(any_with_component::<Body>),
+            joint::gather.run_if(any_with_component::<Joint>),
             gather::forces,
             zones::act,
             gather::leave_out,
@@ -282,6 +290,8 @@ fn add_scatter(app: &mut App) {
             sleep::unmark,
             scatter::marbles,
             sleep::mark,
+            body::scatter.run_if(any_with_component::<Body>),
+            joint::report_broken.run_if(any_with_component::<Joint>),
             refusal::report_stopped,
             swarm::report_stopped,
             sensor::scatter,

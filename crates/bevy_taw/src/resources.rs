@@ -2,6 +2,8 @@
 
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
+use taw::body::BodyId;
+use taw::joint::JointId;
 use taw::motion::ForceField;
 use taw::swarm::BallId;
 use taw::world::{Marble, MarbleId, Model, SensorId, WallId};
@@ -86,6 +88,8 @@ pub struct TawWorld {
     pub(crate) world: taw::world::World<f32>,
     pub(crate) marble_entities: HashMap<MarbleId, Entity>,
     pub(crate) wall_entities: HashMap<WallId, Entity>,
+    pub(crate) body_entities: HashMap<BodyId, Entity>,
+    pub(crate) joint_entities: HashMap<JointId, Entity>,
     pub(crate) sensor_entities: HashMap<SensorId, Entity>,
     /// Entity of the swarm of each slot of balls, also of those that are gone.
     pub(crate) ball_entities: Vec<Option<Entity>>,

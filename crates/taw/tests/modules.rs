@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From what everything uses to what uses everything.
-const ORDER: [&str; 15] = [
+const ORDER: [&str; 16] = [
     "uncompared",
     "math",
     "handle",

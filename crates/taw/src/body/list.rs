@@ -8,7 +8,7 @@ use super::contact::BodyContact;
 use super::state::SolverBody;
 use super::{Body, BodyId};
 use crate::Error;
-use crate::contact::as_convex;
+use crate::contact::{Convex, as_convex};
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Pose;
 use crate::handle::Handles;
@@ -32,6 +32,21 @@ pub(crate) struct BodyState<S> {
     /// Time for which it has been slow, in seconds, and whether it sleeps.
     pub rest: f64,
     pub asleep: bool,
+}
+
+/// Place and motion of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodyMotion<S> {
+    /// Origin of its frame, in metres.
+    pub position: Point3<S>,
+    /// Rotation of its frame.
+    pub rotation: Quat<S>,
+    /// Velocity of its center of mass, in m/s.
+    pub velocity: Vec3<S>,
+    /// Angular velocity, in rad/s.
+    pub angular_velocity: Vec3<S>,
+    /// True if it sleeps.
+    pub is_asleep: bool,
 }
 
 /// Rigid bodies of a world, which only [`SoftStep`](crate::response::Response::SoftStep) knows: other responses refuse
@@ -292,6 +307,67 @@ impl<S: Scalar> Bodies<S> {
         Ok(())
     }
 
+    /// Applies a force in N at its center of mass, and a torque in N m, in the next step. It wakes unless both are
+    /// zero.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`], [`Error::NotFinite`].
+    pub fn apply_central_force(
+        &mut self,
+        id: BodyId,
+        force: Vec3<S>,
+        torque: Vec3<S>,
+    ) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let force = cast_vector(finite_vector(["force.x", "force.y", "force.z"], force)?);
+        let torque = cast_vector(finite_vector(["torque.x", "torque.y", "torque.z"], torque)?);
+        let state = &mut self.states[row];
+        if force != Vec3::zero() || torque != Vec3::zero() {
+            state.wake();
+            state.force[0] += force;
+            state.force[1] += torque;
+        }
+        Ok(())
+    }
+
+    /// Applies an impulse in N s at its center of mass, and an angular impulse in N m s, at once. It wakes.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`], [`Error::NotFinite`].
+    pub fn apply_central_impulse(
+        &mut self,
+        id: BodyId,
+        impulse: Vec3<S>,
+        angular: Vec3<S>,
+    ) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let names = ["impulse.x", "impulse.y", "impulse.z"];
+        let impulse = cast_vector(finite_vector(names, impulse)?);
+        let names = ["angular.x", "angular.y", "angular.z"];
+        let angular = cast_vector(finite_vector(names, angular)?);
+        let state = &mut self.states[row];
+        state.wake();
+        state.solver.apply(impulse, Vec3::zero());
+        state.solver.turn(angular);
+        Ok(())
+    }
+
+    /// Place and motion.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`].
+    pub fn motion(&self, id: BodyId) -> Result<BodyMotion<S>, Error> {
+        let state = &self.states[self.row(id)?];
+        let pose = state.pose();
+        Ok(BodyMotion {
+            position: Point3::from_vec(cast_vector(pose.translation)),
+            rotation: cast_rotation(pose.rotation),
+            velocity: cast_vector(state.solver.velocity),
+            angular_velocity: cast_vector(state.solver.spin),
+            is_asleep: state.asleep,
+        })
+    }
+
     /// Mass properties along the axes of its frame; none of infinite mass.
     ///
     /// # Errors
@@ -400,7 +476,7 @@ fn center_of(shape: &Shape<f64>) -> Vec3<f64> {
 
 /// Distance from the origin of a convex shape, at most.
 fn reach_of(shape: &Shape<f64>) -> f64 {
-    if let Some(ball) = as_convex(shape).and_then(|shape| shape.as_sphere()) {
+    if let Some(ball) = as_convex(shape).and_then(Convex::as_sphere) {
         return ball.center.to_vec().magnitude() + ball.radius;
     }
     let Aabb3 { min, max } = shape.bounding_box();

@@ -14,7 +14,7 @@ mod state;
 mod system;
 
 pub use crate::handle::BodyId;
-pub use list::Bodies;
+pub use list::{Bodies, BodyMotion};
 
 pub(crate) use contact::{
     BodyContact, ContactKey, Partner, SweptManifold, ball_contact, manifold_contact,

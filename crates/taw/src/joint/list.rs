@@ -103,8 +103,8 @@ impl<S: Scalar> Joints<S> {
             }
         }
         let held = |joint: &Joint<S>| joint.ends.map(|end| (end.marble_id(), end.body_id()));
-        let same_bodies = held(&before) == held(&joint)
-            && before.collide_connected == joint.collide_connected;
+        let same_bodies =
+            held(&before) == held(&joint) && before.collide_connected == joint.collide_connected;
         let same_rows = discriminant(&before.kind) == discriminant(&joint.kind)
             && rows::count(&before.kind) == rows::count(&joint.kind);
         if !same_bodies || !same_rows {

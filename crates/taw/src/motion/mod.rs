@@ -12,7 +12,7 @@ pub(crate) use force_field::acceleration_in_step;
 pub use force_field::{ForceField, Medium};
 pub use free_body::{integrate_free_body, world_velocity};
 pub use integrator::{Integrator, Motion};
-pub use mass::Mass;
 pub(crate) use mass::BALL_INVERSE_INERTIA;
+pub use mass::Mass;
 pub use rotation::{FreeRotation, Rotation, integrate_rotation};
 pub use wall_motion::WallMotion;

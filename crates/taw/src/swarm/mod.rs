@@ -56,13 +56,13 @@ mod walls;
 
 pub use crate::handle::BallId;
 pub use crate::math::simd::SimdLevel;
-pub(crate) use step::BallView;
 pub(crate) use bodies::{BodyColumns, BodyRow, MarbleRow, SyncToken, VelocityChange};
 pub(crate) use kernels::NearLimits;
 pub(crate) use limits::{LEAST_RADIUS, MAX_COORDINATE};
 pub use model::{Ball, Stage, SwarmModel, Tier};
 pub(crate) use proxies::Proxy;
 pub use query::{BallQueries, BallQueryHit, BallTree};
+pub(crate) use step::BallView;
 pub(crate) use surfaces::BallSurface;
 pub(crate) use walls::StaticGeometry;
 

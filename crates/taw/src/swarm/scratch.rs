@@ -111,8 +111,8 @@ impl<S: Scalar> SwarmScratch<S> {
             impacts,
             outside_work,
             recorded_impulses,
-            joints: _, // lent for a step, as are bodies
-            bodies: _,
+            joints: _, // lent for a step
+            bodies: _, // likewise
             threads: _,
             filters_changed: _,
             contacts_forgotten: _,
@@ -120,9 +120,7 @@ impl<S: Scalar> SwarmScratch<S> {
         } = self;
         ([column, backing].map(of).iter().sum::<usize>()
             + (of(backing_speed) + of(leaving))
-            + of(displacements)
-            + of(proxy_rows)
-            + of(saved_proxies))
+            + (of(displacements) + of(proxy_rows) + of(saved_proxies)))
             + (of(lists) + lists.iter().chain(waking).map(of).sum::<usize>() + of(waking))
             + (of(chunk_states)
                 + islands.bytes()

@@ -23,7 +23,10 @@ impl<S: Scalar> World<S> {
         if self.bodies.is_empty() || self.settings.model.response.uses_swarm_rows() {
             return Ok(());
         }
-        Err(Error::Unsupported { response: "a response other than SoftStep", feature: "rigid bodies" })
+        Err(Error::Unsupported {
+            response: "a response other than SoftStep",
+            feature: "rigid bodies",
+        })
     }
 
     /// Gives bodies and their contacts to the solver for a step of `dt` seconds.
@@ -43,8 +46,8 @@ impl<S: Scalar> World<S> {
         for state in self.bodies.states.iter_mut().filter(|state| state.is_dynamic()) {
             let [force, torque] = std::mem::replace(&mut state.force, [Vec3::zero(); 2]);
             let solver = &mut state.solver;
-            solver.acceleration = gravity * state.body.gravity_scale.as_f64()
-                + force * solver.inverse_mass;
+            solver.acceleration =
+                gravity * state.body.gravity_scale.as_f64() + force * solver.inverse_mass;
             solver.damping = state.body.damping.map(S::as_f64);
             solver.turn(torque * step);
         }

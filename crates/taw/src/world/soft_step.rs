@@ -378,7 +378,12 @@ impl<S: Scalar> World<S> {
             let flags = [is_kinematic, sleepless];
             if !self.swarm.is_as_read(slot, marble, numbers, (surface, layers), flags) {
                 let body = body(slot, marble, inverse_mass, surface);
-                changed.push(BodyRow { layers, is_kinematic, sleeping_disabled: sleepless, ..body });
+                changed.push(BodyRow {
+                    layers,
+                    is_kinematic,
+                    sleeping_disabled: sleepless,
+                    ..body
+                });
             }
         }
     }

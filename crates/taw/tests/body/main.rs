@@ -5,7 +5,6 @@ mod flight;
 mod joined;
 mod piles;
 mod random;
-mod scratch;
 mod sliding;
 
 use taw::body::{Body, BodyId};

@@ -7,9 +7,9 @@ use super::{EventBall, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
 use crate::broad::Period;
 use crate::contact::Contacts;
 use crate::math::{Point3, UnionFind, Vec3};
-use crate::shape::BALL_INERTIA;
 use crate::response::impulse::{self, CachedImpulse, Context, SubstepStart, solve_contacts};
 use crate::response::{BallRotation, EnergyLedger, SolverBodies};
+use crate::shape::BALL_INERTIA;
 
 /// Convergence tolerance over the speed that gravity adds in a substep: a hundredth of the rest
 /// threshold.

@@ -4,8 +4,8 @@ use cgmath::InnerSpace;
 
 use super::{EventBall, EventSolver, Wall};
 use crate::math::Vec3;
-use crate::shape::BALL_INERTIA;
 use crate::response::{BallRotation, EnergyLedger};
+use crate::shape::BALL_INERTIA;
 
 impl EventSolver {
     /// Advances a ball's trajectory, and books the energy of the motion.

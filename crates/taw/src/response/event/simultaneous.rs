@@ -7,8 +7,8 @@ use super::collide::Collision;
 use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::contact::ContactMaterial;
 use crate::math::Vec3;
-use crate::shape::BALL_INERTIA;
 use crate::response::BallRotation;
+use crate::shape::BALL_INERTIA;
 
 /// Maximum number of iterations.
 const MAX_ROUNDS: u32 = 1000;

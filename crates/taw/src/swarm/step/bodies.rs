@@ -41,8 +41,7 @@ impl<S: Scalar> Swarm<S> {
     /// Visits all balls.
     pub(crate) fn visit_balls(&self, mut visit: impl FnMut(BallView<S>)) {
         let slots = self.ids.slots();
-        let surfaces =
-            SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
+        let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
         for (row, (at, velocity)) in self.at.iter().zip(&self.velocity).enumerate() {
             visit(BallView {
                 slot: slots[row],
@@ -105,7 +104,8 @@ impl<S: Scalar> Swarm<S> {
             ball.pose.translation = cast_vector(xyz(&at));
             let inverse_mass = self.velocity[row][3].as_f64();
             ball.inverse_mass = inverse_mass.max(0.0); // what sleeps stays
-            let locked = self.surfaces.get(ball.slot).is_some_and(|surface| surface.rotation_locked);
+            let locked =
+                self.surfaces.get(ball.slot).is_some_and(|surface| surface.rotation_locked);
             let radius = at[3].as_f64();
             let turns = if locked { 0.0 } else { BALL_INVERSE_INERTIA / (radius * radius) };
             ball.inverse_inertia = Mat3::from_value(ball.inverse_mass * turns);

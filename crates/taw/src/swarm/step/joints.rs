@@ -77,8 +77,7 @@ impl<S: Scalar> Swarm<S> {
             let row = self.ids.rows()[slot as usize] as usize;
             if self.spin[row][3] == S::zero() {
                 body.fall += cast_vector(gravity * (half * h * h));
-                let own =
-                    self.velocity_changes.binary_search_by_key(&slot, |change| change.slot);
+                let own = self.velocity_changes.binary_search_by_key(&slot, |change| change.slot);
                 if let Ok(own) = own {
                     let change = Vec3::from(self.velocity_changes[own].change);
                     body.fall += cast_vector(change * (half * share));

@@ -1,0 +1,324 @@
+//! Joints between marbles, bodies and places in the world.
+
+use bevy::ecs::world::DeferredWorld;
+use bevy::prelude::*;
+use taw::frame::Pose;
+use taw::joint as core;
+use taw::joint::JointId;
+
+use crate::body::{Body, BodyState};
+use crate::components::{Marble, MarbleState};
+use crate::convert::{to_rotation, to_vector};
+use crate::refusal::Refusals;
+use crate::resources::TawWorld;
+
+/// Joint: an entity of its own that holds two others, or one and a place in the world. It goes when one of them does.
+///
+/// Hinges and wheels turn about z of the joint's frame, sliders and suspensions go along x. Joints need
+/// [`Response::SoftStep`](taw::response::Response::SoftStep), the default.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_taw::prelude::*;
+///
+/// fn spawn_door(mut commands: Commands) {
+///     let door = commands.spawn(Body::from(Cuboid::new(1.0, 2.0, 0.1))).id();
+///     let upright = Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2); // z points upward
+///     commands.spawn(Joint::new(
+///         JointKind::Hinge(JointDrive { limits: Some([-1.5, 1.5]), motor: None }),
+///         JointEnd::world(Vec3::new(-0.5, 0.0, 0.0)).with_rotation(upright),
+///         JointEnd::on(door, Vec3::new(-0.5, 0.0, 0.0)).with_rotation(upright),
+///     ));
+/// }
+/// ```
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component, Debug, PartialEq)]
+#[require(JointState)]
+pub struct Joint {
+    /// Motions that it leaves free.
+    pub kind: JointKind,
+    /// Its ends.
+    pub ends: [JointEnd; 2],
+    /// True if the two that it holds collide with each other.
+    pub collide_connected: bool,
+    /// Force in N beyond which it breaks; infinite for never.
+    pub breaking_force: f32,
+    /// Torque in N m beyond which it breaks; infinite for never.
+    pub breaking_torque: f32,
+}
+
+/// End of a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Debug, PartialEq)]
+pub struct JointEnd {
+    /// Marble or body; none for a place in the world, which may move.
+    pub entity: Option<Entity>,
+    /// Anchor in the frame of the entity, or in the world, in metres.
+    pub anchor: Vec3,
+    /// Rotation of the joint's frame there.
+    pub rotation: Quat,
+}
+
+/// Spring and damper.
+#[derive(Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Debug, PartialEq)]
+pub struct JointSpring {
+    /// Oscillations per second without damping, above zero.
+    pub frequency: f32,
+    /// Damping over critical damping; at least zero.
+    pub damping_ratio: f32,
+}
+
+/// Motor of the free axis of a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Debug, PartialEq)]
+pub enum JointMotor {
+    /// Holds a speed; one of zero is a brake.
+    Speed {
+        /// Target, in rad/s, or m/s along a slider.
+        target: f32,
+        /// Largest torque in N m, or force in N.
+        max: f32,
+    },
+    /// Holds a position by a spring.
+    Position {
+        /// Target, in rad within ±.99 π, or m along a slider.
+        target: f32,
+        /// The spring.
+        spring: JointSpring,
+        /// Largest torque in N m, or force in N.
+        max: f32,
+    },
+}
+
+/// Limits and motor of the free axis of a joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Debug, Default, PartialEq)]
+pub struct JointDrive {
+    /// Least and largest position, in rad within ±.99 π, or m along a slider.
+    pub limits: Option<[f32; 2]>,
+    /// Its motor.
+    pub motor: Option<JointMotor>,
+}
+
+/// Kind of a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Debug, PartialEq)]
+pub enum JointKind {
+    /// Anchors coincide.
+    BallAndSocket,
+    /// Turn about z.
+    Hinge(JointDrive),
+    /// Way along x of the first end.
+    Slider(JointDrive),
+    /// No motion.
+    Fixed,
+    /// Distance of the anchors within a range, in metres: a rod for two equal bounds, a rope from zero on.
+    Distance([f32; 2]),
+    /// Spring between the anchors.
+    Spring {
+        /// Length at rest, in metres.
+        length: f32,
+        /// Frequency and damping.
+        spring: JointSpring,
+    },
+    /// Turn about z, and way along x of the first end on a spring.
+    Wheel {
+        /// Suspension.
+        spring: JointSpring,
+        /// Least and largest way of the suspension, in metres.
+        travel: [f32; 2],
+        /// Drive of the turning.
+        drive: JointDrive,
+    },
+    /// The first end turns about its z by `−ratio` times the turn of the second.
+    Gear {
+        /// Ratio of the two, other than zero.
+        ratio: f32,
+    },
+}
+
+/// A joint broke in the last step, under more than its breaking force or torque; the component goes.
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Debug, PartialEq)]
+pub struct JointBroken {
+    /// Entity of the joint.
+    pub joint: Entity,
+}
+
+/// Handle of a joint in the physics.
+#[derive(Component, Clone, Copy, Debug, Default)]
+pub(crate) struct JointState(Option<JointId>);
+
+impl Joint {
+    /// Joint that never breaks, and whose two do not collide with each other.
+    #[must_use]
+    pub fn new(kind: JointKind, first: JointEnd, second: JointEnd) -> Self {
+        Self {
+            kind,
+            ends: [first, second],
+            collide_connected: false,
+            breaking_force: f32::INFINITY,
+            breaking_torque: f32::INFINITY,
+        }
+    }
+}
+
+impl JointEnd {
+    /// Anchor in the frame of a marble or a body, in metres.
+    #[must_use]
+    pub fn on(entity: Entity, anchor: Vec3) -> Self {
+        Self { entity: Some(entity), anchor, rotation: Quat::IDENTITY }
+    }
+
+    /// Anchor in the world, in metres.
+    #[must_use]
+    pub fn world(anchor: Vec3) -> Self {
+        Self { entity: None, anchor, rotation: Quat::IDENTITY }
+    }
+
+    /// Turns the joint's frame.
+    #[must_use]
+    pub fn with_rotation(self, rotation: Quat) -> Self {
+        Self { rotation, ..self }
+    }
+}
+
+impl From<JointSpring> for core::JointSpring<f32> {
+    fn from(JointSpring { frequency, damping_ratio }: JointSpring) -> Self {
+        Self { frequency, damping_ratio }
+    }
+}
+
+impl From<JointDrive> for core::JointDrive<f32> {
+    fn from(JointDrive { limits, motor }: JointDrive) -> Self {
+        let motor = motor.map(|motor| match motor {
+            JointMotor::Speed { target, max } => core::JointMotor::Speed { target, max },
+            JointMotor::Position { target, spring, max } => {
+                core::JointMotor::Position { target, spring: spring.into(), max }
+            }
+        });
+        Self { limits, motor }
+    }
+}
+
+impl From<JointKind> for core::JointKind<f32> {
+    fn from(kind: JointKind) -> Self {
+        match kind {
+            JointKind::BallAndSocket => Self::BallAndSocket,
+            JointKind::Hinge(drive) => Self::Hinge(drive.into()),
+            JointKind::Slider(drive) => Self::Slider(drive.into()),
+            JointKind::Fixed => Self::Fixed,
+            JointKind::Distance(range) => Self::Distance(range),
+            JointKind::Spring { length, spring } => Self::Spring { length, spring: spring.into() },
+            JointKind::Wheel { spring, travel, drive } => {
+                Self::Wheel { spring: spring.into(), travel, drive: drive.into() }
+            }
+            JointKind::Gear { ratio } => Self::Gear { ratio },
+        }
+    }
+}
+
+/// Puts new joints in, changes those that were written, and takes the component of those whose ends are gone.
+pub(crate) fn gather(
+    mut world: ResMut<TawWorld>,
+    mut joints: Query<(Entity, Ref<Joint>, &mut JointState)>,
+    held: Query<(Option<&MarbleState>, Option<&BodyState>), Or<(With<Marble>, With<Body>)>>,
+    mut refusals: Refusals,
+    mut commands: Commands,
+) {
+    let (mut ready, mut loose) = (Vec::new(), Vec::new());
+    for (entity, joint, mut state) in &mut joints {
+        let known = state.0.filter(|id| world.joints.get(*id).is_ok());
+        if state.0.is_some() && known.is_none() {
+            loose.push(entity); // an end is gone
+            state.0 = None;
+            continue;
+        }
+        if known.is_some() && !joint.is_changed() {
+            continue;
+        }
+        let mut ends = [None; 2];
+        for (end, found) in joint.ends.iter().zip(&mut ends) {
+            let frame =
+                Pose { rotation: to_rotation(end.rotation), translation: to_vector(end.anchor) };
+            *found = match end.entity {
+                None => Some(core::JointEnd::World { frame }),
+                Some(other) => match held.get(other) {
+                    Err(_) => {
+                        loose.push(entity);
+                        None
+                    }
+                    Ok((marble, body)) => {
+                        let marble = marble.and_then(|it| it.id);
+                        let body = body.and_then(|it| it.id);
+                        match (marble, body) {
+                            (Some(marble), _) => Some(core::JointEnd::Marble { marble, frame }),
+                            (_, Some(body)) => Some(core::JointEnd::Body { body, frame }),
+                            _ => None, // refused, or not there yet
+                        }
+                    }
+                },
+            };
+        }
+        if let [Some(first), Some(second)] = ends {
+            ready.push((
+                entity,
+                known,
+                core::Joint {
+                    ends: [first, second],
+                    kind: joint.kind.into(),
+                    collide_connected: joint.collide_connected,
+                    breaking_force: joint.breaking_force,
+                    breaking_torque: joint.breaking_torque,
+                },
+            ));
+        }
+    }
+    for (entity, known, joint) in ready {
+        let set = match known {
+            Some(id) => world.joints.set(id, joint).map(|()| id),
+            None => world.joints.insert(joint),
+        };
+        match set {
+            Ok(id) => {
+                world.joint_entities.insert(id, entity);
+                if let Ok((.., mut state)) = joints.get_mut(entity) {
+                    state.0 = Some(id);
+                }
+            }
+            Err(error) => {
+                refusals.check(Some(entity), Err::<(), _>(error));
+            }
+        }
+    }
+    for entity in loose {
+        commands.entity(entity).try_remove::<Joint>();
+    }
+}
+
+/// Tells which joints broke in the last step, and takes their components.
+pub(crate) fn report_broken(
+    mut world: ResMut<TawWorld>,
+    mut broken: MessageWriter<JointBroken>,
+    mut commands: Commands,
+) {
+    let ids = world.joints.broken().to_vec();
+    for id in ids {
+        if let Some(joint) = world.joint_entities.remove(&id) {
+            broken.write(JointBroken { joint });
+            commands.entity(joint).try_remove::<Joint>();
+        }
+    }
+}
+
+/// Takes a joint out of the world when its component or entity goes.
+pub(crate) fn forget(removed: On<Remove, Joint>, mut app: DeferredWorld) {
+    let id = app.get::<JointState>(removed.entity).and_then(|state| state.0);
+    let mut world = app.resource_mut::<TawWorld>();
+    if let Some(id) = id {
+        let _ = world.joints.remove(id); // or it broke, or an end went
+        world.joint_entities.remove(&id);
+    }
+    app.commands().entity(removed.entity).try_remove::<JointState>();
+}
