@@ -10,10 +10,10 @@ use crate::frame::Pose;
 use crate::handle::{BodyId, WallId};
 use crate::math::Vec3;
 
-/// What a body touches, in the order in which contacts are solved: walls last, so that nothing is pushed into
+/// BodyPartner of a body in a contact, in the order in which contacts are solved: walls last, so that nothing is pushed into
 /// them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Partner {
+pub(crate) enum BodyPartner {
     Body(BodyId),
     /// Ball of the swarm, by its slot.
     Ball(u32),
@@ -22,8 +22,8 @@ pub(crate) enum Partner {
 
 /// Identity of a contact: who touches, and with which convex parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct ContactKey {
-    pub partner: Partner,
+pub(crate) struct BodyContactKey {
+    pub partner: BodyPartner,
     pub body: BodyId,
     /// Part of the partner, and of the body.
     pub parts: [u32; 2],
@@ -32,8 +32,8 @@ pub(crate) struct ContactKey {
 /// Contact of two convex parts.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct BodyContact {
-    pub key: ContactKey,
-    /// Partner and body, by index in the solver.
+    pub key: BodyContactKey,
+    /// BodyPartner and body, by index in the solver.
     pub bodies: [u32; 2],
     /// Unit normal, from the partner to the body.
     pub normal: Vec3<f64>,
@@ -77,7 +77,7 @@ pub(crate) struct SweptManifold {
 
 /// Contact of a manifold between two parts.
 pub(crate) fn manifold_contact(
-    key: ContactKey,
+    key: BodyContactKey,
     bodies: [u32; 2],
     SweptManifold { manifold, radii, ends }: &SweptManifold,
     material: ContactMaterial<f64>,
@@ -105,7 +105,7 @@ pub(crate) fn manifold_contact(
 
 /// Contact of a ball of this radius and a part of a body, which is found anew in each substep.
 pub(crate) fn ball_contact(
-    key: ContactKey,
+    key: BodyContactKey,
     bodies: [u32; 2],
     radius: f64,
     material: ContactMaterial<f64>,
@@ -133,14 +133,14 @@ impl BodyContactPoint {
 impl BodyContact {
     /// Returns true if it is one of a body.
     pub fn is_of(&self, id: BodyId) -> bool {
-        self.key.body == id || self.key.partner == Partner::Body(id)
+        self.key.body == id || self.key.partner == BodyPartner::Body(id)
     }
 
     /// The other body of a contact of this one.
     pub fn other(&self, id: BodyId) -> Option<BodyId> {
         match self.key.partner {
-            Partner::Body(partner) if self.key.body == id => Some(partner),
-            Partner::Body(partner) if partner == id => Some(self.key.body),
+            BodyPartner::Body(partner) if self.key.body == id => Some(partner),
+            BodyPartner::Body(partner) if partner == id => Some(self.key.body),
             _ => None,
         }
     }

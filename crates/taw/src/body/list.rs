@@ -36,7 +36,7 @@ pub(crate) struct BodyState<S> {
 
 /// Place and motion of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BodyMotion<S> {
+pub struct BodyPlace<S> {
     /// Origin of its frame, in metres.
     pub position: Point3<S>,
     /// Rotation of its frame.
@@ -356,10 +356,10 @@ impl<S: Scalar> Bodies<S> {
     ///
     /// # Errors
     /// [`Error::NoSuchBody`].
-    pub fn motion(&self, id: BodyId) -> Result<BodyMotion<S>, Error> {
+    pub fn motion(&self, id: BodyId) -> Result<BodyPlace<S>, Error> {
         let state = &self.states[self.row(id)?];
         let pose = state.pose();
-        Ok(BodyMotion {
+        Ok(BodyPlace {
             position: Point3::from_vec(cast_vector(pose.translation)),
             rotation: cast_rotation(pose.rotation),
             velocity: cast_vector(state.solver.velocity),

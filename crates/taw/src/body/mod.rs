@@ -14,10 +14,10 @@ mod state;
 mod system;
 
 pub use crate::handle::BodyId;
-pub use list::{Bodies, BodyMotion};
+pub use list::{Bodies, BodyPlace};
 
 pub(crate) use contact::{
-    BodyContact, ContactKey, Partner, SweptManifold, ball_contact, manifold_contact,
+    BodyContact, BodyContactKey, BodyPartner, SweptManifold, ball_contact, manifold_contact,
 };
 pub(crate) use list::BodyState;
 pub(crate) use state::{SolverBody, turned_freely};

@@ -13,7 +13,7 @@ use crate::constraint::{ContactImpulse, ContactSoftness, FrictionCone, Softness}
 use crate::math::Vec3;
 use crate::shape::any_perpendicular;
 
-/// How long the points of one contact, which are solved together, are swept over: until no impulse changes by more
+/// Sweeps over the points of one contact, which are solved together: until no impulse changes by more
 /// than this part of the largest, and at most so often.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sweeps {

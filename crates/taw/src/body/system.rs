@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
-use super::contact::{BodyContact, Partner};
+use super::contact::{BodyContact, BodyPartner};
 use super::solve::SubstepParams;
 use super::state::SolverBody;
 use crate::constraint::ContactSoftness;
@@ -126,7 +126,7 @@ impl BodySystem {
             .key
             .partner
         {
-            Partner::Ball(slot) => Some(slot),
+            BodyPartner::Ball(slot) => Some(slot),
             _ => None,
         })
     }
@@ -134,7 +134,7 @@ impl BodySystem {
     /// Finds separations and arms where bodies are now.
     fn update_contacts(&mut self, h: f64) {
         for contact in &mut self.contacts {
-            if let Partner::Ball(_) = contact.key.partner {
+            if let BodyPartner::Ball(_) = contact.key.partner {
                 let [ball, body] = contact.bodies.map(|body| &self.bodies[body as usize]);
                 let part = &self.parts[contact.bodies[1] as usize][contact.key.parts[1] as usize];
                 contact.update_ball(ball, body, part, h);

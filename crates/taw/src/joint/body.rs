@@ -11,7 +11,7 @@ use crate::motion::integrate_rotation;
 /// Largest error that a substep removes, in units of the smaller radius, and in rad.
 const MAX_CORRECTION: f64 = 1.0;
 
-/// What a joint holds.
+/// Owner of an end of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum JointOwner {
     /// Place in the world.

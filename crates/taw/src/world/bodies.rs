@@ -9,7 +9,7 @@ use crate::body::{BodyContact, BodyState, BodySystem, Partner};
 use crate::math::{Scalar, UnionFind, Vec3, cast_vector};
 use crate::motion::rest;
 
-/// What a sleeping body lies on: gravity, and the identity of the walls.
+/// Gravity and identity of the walls by which bodies fell asleep, and scratch memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BodyScratch<S> {
     gravity: Option<Vec3<S>>,

@@ -1,4 +1,4 @@
-//! What rigid bodies touch: candidates by boxes, and manifolds of convex parts.
+//! Contacts of rigid bodies: candidates by boxes, and manifolds of convex parts.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,7 +10,7 @@ use super::joints::JointHeld;
 use super::swept_manifold::{ContactReach, swept_manifold};
 use super::walls::SubShape;
 use crate::body::{
-    BodyContact, BodyState, BodySystem, ContactKey, Partner, SolverBody, ball_contact,
+    BodyContact, BodyContactKey, BodyPartner, BodyState, BodySystem, SolverBody, ball_contact,
     manifold_contact,
 };
 use crate::broad::CollisionFilter;
@@ -171,8 +171,11 @@ impl<S: Scalar> World<S> {
             let shape = WallCollider::Solid(state.part(at));
             let reach = ContactReach { margin: candidate.margin, slack: candidate.slack, dt };
             let found = swept_manifold([collider, &shape], ends, reach)?;
-            let key =
-                ContactKey { partner: Partner::Wall(id), body, parts: [part.index, at as u32] };
+            let key = BodyContactKey {
+                partner: BodyPartner::Wall(id),
+                body,
+                parts: [part.index, at as u32],
+            };
             Some(manifold_contact(key, bodies, &found, material))
         };
         (0..state.parts.len()).filter_map(of_part).collect()
@@ -229,7 +232,7 @@ impl<S: Scalar> World<S> {
                 let shapes = [&one, &WallCollider::Solid(other)];
                 let Some(found) = swept_manifold(shapes, ends.each_ref(), reach) else { continue };
                 let parts = [i as u32, j as u32];
-                let key = ContactKey { partner: Partner::Body(a), body: b, parts };
+                let key = BodyContactKey { partner: BodyPartner::Body(a), body: b, parts };
                 system.contacts.push(manifold_contact(key, bodies, &found, material));
             }
         }
@@ -294,7 +297,11 @@ impl<S: Scalar> World<S> {
                     system.bodies.push(SolverBody::ball(ball.slot));
                 }
                 let bodies = [(system.bodies.len() - 1) as u32, row as u32];
-                let key = ContactKey { partner: Partner::Ball(ball.slot), body, parts: [0, part] };
+                let key = BodyContactKey {
+                    partner: BodyPartner::Ball(ball.slot),
+                    body,
+                    parts: [0, part],
+                };
                 let material = ball.material.combined_with(state.body.material).cast();
                 system.contacts.push(ball_contact(key, bodies, ball.radius(), material));
             }

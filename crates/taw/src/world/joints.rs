@@ -238,7 +238,7 @@ impl<S: Scalar> Joints<S> {
     }
 }
 
-/// What a joint holds.
+/// Marble or body that a joint holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum JointHeld {
     Marble(MarbleId),
