@@ -6,7 +6,7 @@ use super::rows::{RowGeometry, RowRule};
 use crate::frame::Pose;
 use crate::handle::NO_ROW;
 use crate::math::Vec3;
-use crate::motion::integrate_rotation;
+use crate::motion::{LockedAxes, integrate_rotation};
 
 /// Largest error that a substep removes, in units of the smaller radius, and in rad.
 const MAX_CORRECTION: f64 = 1.0;
@@ -19,6 +19,8 @@ pub(crate) struct JointBody {
     /// Inverse mass in 1/kg, and inverse moment of inertia in 1/(kg m²); zero for what nothing moves or turns.
     pub inverse_mass: f64,
     pub inverse_inertia: f64,
+    /// Axes of the world that it neither moves along nor turns about.
+    pub locked_axes: LockedAxes,
     /// Center and rotation.
     pub pose: Pose<f64>,
     /// Velocity in m/s, and angular velocity in rad/s.
@@ -51,6 +53,7 @@ impl JointBody {
             slot: NO_ROW,
             inverse_mass: 0.0,
             inverse_inertia: 0.0,
+            locked_axes: LockedAxes::NONE,
             pose,
             velocity: Vec3::zero(),
             spin: Vec3::zero(),
@@ -82,8 +85,8 @@ impl JointBody {
 
     pub fn apply(&mut self, linear: Vec3<f64>, angular: Vec3<f64>) {
         let [mass, inertia] = self.inverse;
-        self.velocity += linear * mass;
-        self.spin += angular * inertia;
+        self.velocity += self.locked_axes.free_translation(linear * mass);
+        self.spin += self.locked_axes.free_rotation(angular * inertia);
     }
 }
 
@@ -134,6 +137,8 @@ impl JointRow {
             for its in (0..2).filter(|its| other.bodies[*its] == self.bodies[end]) {
                 let body = &bodies[self.bodies[end] as usize];
                 let ([a, b], [c, d]) = (self.jacobian(end), other.jacobian(its));
+                let (c, d) =
+                    (body.locked_axes.free_translation(c), body.locked_axes.free_rotation(d));
                 sum += a.dot(c) * body.inverse[0] + b.dot(d) * body.inverse[1];
             }
         }

@@ -70,6 +70,7 @@ impl<S: Scalar> Swarm<S> {
                     let change = Vec3::from(self.velocity_changes[own].change);
                     body.fall += cast_vector(change * (half * share));
                 }
+                body.fall = body.locked_axes.free_translation(body.fall);
             }
         }
         self.scratch.joints = joints;
@@ -103,6 +104,7 @@ impl<S: Scalar> Swarm<S> {
             }
         }
         self.scratch.joints = joints;
+        self.hold_rows(); // to the bit
     }
 }
 
