@@ -182,6 +182,7 @@ pub mod ignore;
 pub mod ignored;
 pub mod interpolation;
 pub mod layers;
+pub mod locked_axes;
 #[cfg(feature = "mesh")]
 pub mod mesh_walls;
 pub mod messages;
@@ -231,6 +232,7 @@ pub mod prelude {
     pub use crate::ignore::{ColliderDisabled, IgnoreCollisions, OneWay};
     pub use crate::ignored::IgnoredComponents;
     pub use crate::layers::{CollisionLayers, LayerMask, PhysicsLayer};
+    pub use crate::locked_axes::LockedAxes;
     #[cfg(feature = "mesh")]
     pub use crate::mesh_walls::{MeshShape, MeshWalls};
     pub use crate::messages::{
