@@ -20,7 +20,9 @@ pub(super) struct HeldMarble<S> {
 impl<S: Scalar> World<S> {
     /// Refuses locked axes where the response has no method for them.
     pub(super) fn check_locked_axes(&self) -> Result<(), Error> {
-        if self.marbles.own.locked_axes.is_empty() || self.settings.model.response.knows_locked_axes() {
+        if self.marbles.own.locked_axes.is_empty()
+            || self.settings.model.response.knows_locked_axes()
+        {
             return Ok(());
         }
         Err(LOCKS_REFUSED)

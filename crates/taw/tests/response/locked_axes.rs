@@ -284,10 +284,13 @@ fn a_tumbling_capsule_with_a_locked_axis_keeps_its_energy() {
 fn a_pendulum_in_a_plane_swings_as_a_free_one() {
     let run = |locked_axes: LockedAxes| {
         let mut world = world::<f64>(Response::SoftStep);
-        world.set_gravity(vector(0.0, -9.81, if locked_axes.is_empty() { 0.0 } else { 5.0 })).unwrap();
+        world
+            .set_gravity(vector(0.0, -9.81, if locked_axes.is_empty() { 0.0 } else { 5.0 }))
+            .unwrap();
         let marble = Marble::new(point(1.0, 0.0, 0.0), 0.1);
         let id = world.marbles.insert(Marble { locked_axes, ..marble }).unwrap();
-        let ends = [JointEnd::world(point(0.0, 0.0, 0.0)), JointEnd::marble(id, vector(-1.0, 0.0, 0.0))];
+        let ends =
+            [JointEnd::world(point(0.0, 0.0, 0.0)), JointEnd::marble(id, vector(-1.0, 0.0, 0.0))];
         world.joints.insert(Joint::new(JointKind::BallAndSocket, ends)).unwrap();
         steps(&mut world, 100);
         world.marbles.get(id).unwrap()

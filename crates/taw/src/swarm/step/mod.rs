@@ -368,14 +368,14 @@ impl<S: Scalar> Swarm<S> {
     /// Changes velocities and moves the balls that are awake.
     fn integrate(&mut self, change: Row<S>, time: Row<S>, correction: Row<S>) {
         let simd_level = *self.simd_level;
-        let SwarmScratch { backing, backing_speed, free_axes, .. } = &mut self.scratch;
+        let SwarmScratch { threads, backing, backing_speed, free_axes, .. } = &mut self.scratch;
         let columns = SolverColumns::new(
             [&mut self.at, &mut self.velocity, &mut self.spin, backing, free_axes],
             [&mut self.skin_left, backing_speed],
         );
         let chunks = DisjointSlice::new(&mut self.chunks);
         let least = -self.skin;
-        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
+        parallel_for(*threads, chunks.len(), |_, chunk| {
             // SAFETY: each thread has its own chunks, and their rows.
             let chunk = unsafe { &mut *chunks.row(chunk) };
             if chunk.asleep {
@@ -458,14 +458,14 @@ impl<S: Scalar> Swarm<S> {
         &mut self,
         job: impl Fn(Option<(bool, S)>, SolverColumns<S>, &mut Chunk<S>) + Sync,
     ) {
-        let SwarmScratch { backing, backing_speed, free_axes, .. } = &mut self.scratch;
+        let SwarmScratch { threads, chunk_states, backing, backing_speed, free_axes, .. } =
+            &mut self.scratch;
         let columns = SolverColumns::new(
             [&mut self.at, &mut self.velocity, &mut self.spin, backing, free_axes],
             [&mut self.skin_left, backing_speed],
         );
         let chunks = DisjointSlice::new(&mut self.chunks);
-        let (threads, states) = (self.scratch.threads, &mut self.scratch.chunk_states);
-        parallel_for_odd_even(threads, chunks.len(), states, |chunk| {
+        parallel_for_odd_even(*threads, chunks.len(), chunk_states, |chunk| {
             // SAFETY: nobody works on a neighbour meanwhile. Of the next one, only what nobody
             // changes is read.
             unsafe {

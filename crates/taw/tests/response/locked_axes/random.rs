@@ -61,12 +61,16 @@ fn scene<S: Scalar>(response: Response, seed: u64, is_locked: bool) -> Scene<S> 
     let mut ids = Vec::new();
     while ids.len() < 2 + seed as usize % 4 {
         // The method of positions knows no masses, so these are equal by it.
-        let radius = if response == Response::Displacement { 0.15 } else { draw.between(0.08, 0.2) };
+        let radius =
+            if response == Response::Displacement { 0.15 } else { draw.between(0.08, 0.2) };
         let at = [(); 3].map(|()| draw.between(-1.2, 1.2));
         let at: Point3<S> = Point3::from(at).map(number);
-        let is_free = world.marbles.position().iter().zip(world.marbles.radius()).all(|(p, r)| {
-            (p - at).magnitude() > *r + number(radius * 1.05)
-        });
+        let is_free = world
+            .marbles
+            .position()
+            .iter()
+            .zip(world.marbles.radius())
+            .all(|(p, r)| (p - at).magnitude() > *r + number(radius * 1.05));
         if !is_free || Vec3::from([at.x, at.y, at.z].map(S::as_f64)).magnitude() < 1.05 {
             continue; // the block is there
         }
@@ -145,10 +149,14 @@ fn largest_gain<S: Scalar>(response: Response, scenes: u64, is_locked: bool) -> 
 fn locks_hold_to_the_bit_and_add_no_energy() {
     for response in RESPONSES {
         let free = largest_gain::<f32>(response, 400, false);
-        let gains = [largest_gain::<f32>(response, 800, true), largest_gain::<f64>(response, 400, true)];
+        let gains =
+            [largest_gain::<f32>(response, 800, true), largest_gain::<f64>(response, 400, true)];
         for gain in gains {
             // As much as the method makes of free marbles.
-            assert!(gain < free.max(1e-3) * 1.5, "{response:?}: {gain:.1e}, of free ones {free:.1e}");
+            assert!(
+                gain < free.max(1e-3) * 1.5,
+                "{response:?}: {gain:.1e}, of free ones {free:.1e}"
+            );
         }
     }
 }
@@ -159,7 +167,9 @@ fn a_pinball_in_a_plane_stays_in_it() {
     for response in RESPONSES {
         let mut world = world::<f32>(response);
         world.set_gravity(vector(0.5, -6.0, 3.0)).unwrap();
-        for (normal, offset) in [([1.0, 0.0], -2.0), ([-1.0, 0.0], -2.0), ([0.0, 1.0], -2.0), ([0.0, -1.0], -3.0)] {
+        for (normal, offset) in
+            [([1.0, 0.0], -2.0), ([-1.0, 0.0], -2.0), ([0.0, 1.0], -2.0), ([0.0, -1.0], -3.0)]
+        {
             let [x, y] = normal;
             world.walls.insert(Plane::new(vector(x, y, 0.0), offset).unwrap()).unwrap();
         }
