@@ -324,15 +324,21 @@ impl<S: Scalar> WallContact<S> {
     ) -> Option<Bounce<S>> {
         let bounce = self.bounce(params, at, velocity)?;
         let Bounce { separation, approach_speed, impact_speed } = bounce;
+        let normal = (approach_speed + impact_speed * self.numbers.restitution)
+            / (velocity[3] * self.share());
+        let mut left = normal;
+        if !self.numbers.locked_axes.moves_freely() {
+            // Along a lock it changes the slip too: both at once would add energy.
+            self.apply_impulse(velocity, spin, ContactImpulse { normal, ..ContactImpulse::zero() });
+            left = S::zero();
+        }
         let relative = xyz(velocity) - self.surface;
         let stopping = self.slip(relative, spin) * (-self.tangent_mass() / velocity[3]);
-        let impulse = FrictionCone::new(self.numbers.friction).clamp(ContactImpulse {
-            normal: (approach_speed + impact_speed * self.numbers.restitution)
-                / (velocity[3] * self.share()),
-            tangent: stopping * (S::one() + self.numbers.tangential_restitution),
-        });
+        let tangent = stopping * (S::one() + self.numbers.tangential_restitution);
+        let impulse = FrictionCone::new(self.numbers.friction);
+        let impulse = impulse.clamp(ContactImpulse { normal, tangent });
         set(at, xyz(at) + self.way_nearer(separation));
-        self.apply_impulse(velocity, spin, impulse);
+        self.apply_impulse(velocity, spin, ContactImpulse { normal: left, ..impulse });
         Some(bounce)
     }
 

@@ -164,30 +164,37 @@ impl<S: Scalar> SolverColumns<'_, S> {
         if !bounces && tipping.is_none() {
             return false;
         }
-        let relative = Vec3Wide::of(&b) - Vec3Wide::of(&a);
+        let point = Vec3Wide::of(&at_a) + Vec3Wide::of(&a) * time + normal * at_a[3];
         let [pushed_a, pushed_b] = self.pushed::<L, LOCKED>(batch, &[a, b], normal);
         let mass = effective_mass(&pushed_a, &pushed_b);
-        let spins = self.spins(batch);
-        let slip = slip(relative, normal, &spins);
-        let one = L::constant(1.0);
-        let stopping = slip * (zero - numbers.tangent_mass::<OWN>(mass, [&a, &b]));
+        let (spins, factors) = (self.spins(batch), numbers.inertia_factors);
+        let (one, none) = (L::constant(1.0), Vec3Wide([zero; 3]));
         let restitution = tipping.map_or(numbers.restitution, |tipping| {
             tipping::restitution(tipping, numbers.restitution)
         });
-        let mut impulse = FrictionCone::new(numbers.friction).clamp(ContactImpulse {
-            normal: mass * approach_speed * (one + restitution),
-            tangent: stopping * (one + numbers.tangential_restitution),
-        });
+        let whole =
+            ContactImpulse { normal: mass * approach_speed * (one + restitution), tangent: none };
+        let (mut ends, mut left) = ([a, b], whole.normal);
+        if LOCKED {
+            // Along a lock it changes the slip too: both at once would add energy.
+            self.apply_impulse::<L, false, true>(batch, ends, spins, normal, whole, factors);
+            (ends, left) = (gather::<L>(self.velocity, batch), zero);
+        }
+        let relative = Vec3Wide::of(&ends[1]) - Vec3Wide::of(&ends[0]);
+        let slip = slip(relative, normal, &spins);
+        let stopping = slip * (zero - numbers.tangent_mass::<OWN>(mass, [&a, &b]));
+        let tangent = stopping * (one + numbers.tangential_restitution);
+        let mut impulse =
+            FrictionCone::new(numbers.friction).clamp(ContactImpulse { tangent, ..whole });
         if let Some(tipping) = tipping {
             impulse.tangent = impulse.tangent + tipping * mass;
         }
         if params.notes_impacts {
-            let point = Vec3Wide::of(&at_a) + Vec3Wide::of(&a) * time + normal * at_a[3];
             let vectors = [normal, point, slip, impulse.along(normal)];
             note_impacts(impacts, batch, approach_speed, vectors);
         }
-        let factors = numbers.inertia_factors;
-        self.apply_impulse::<L, false, LOCKED>(batch, [a, b], spins, normal, impulse, factors);
+        let rest = ContactImpulse { normal: left, ..impulse };
+        self.apply_impulse::<L, false, LOCKED>(batch, ends, spins, normal, rest, factors);
         bounces
     }
 
