@@ -63,7 +63,7 @@ fn rebound<S: Scalar>(response: Response, normal: Vec3<f64>, restitution: f64) -
         ..Marble::new(point(0.0, 0.3, -0.7), S::from_f64(0.1))
     };
     let id = world.marbles.insert(marble).unwrap();
-    steps(&mut world, 180);
+    steps(&mut world, 480);
     let after = world.marbles.get(id).unwrap();
     (after.velocity.x.as_f64(), after)
 }
@@ -243,12 +243,11 @@ fn an_upright_capsule_stays_upright_and_gains_nothing() {
         };
         let id = world.marbles.insert(capsule).unwrap();
         steps(&mut world, 1);
-        let mut least = world.energy().total();
+        let start = world.energy().total();
         for _ in 0..120 {
             steps(&mut world, 1);
             let now = world.energy().total();
-            assert!(now < least + 1e-3 * least.abs(), "{response:?}: {now} {least}");
-            least = least.min(now);
+            assert!(now < start + 1e-3 * start.abs(), "{response:?}: {now} {start}");
         }
         let Quat { v, .. } = world.marbles.get(id).unwrap().rotation;
         assert_eq!([v.x, v.z], [0.0, 0.0], "{response:?}");
