@@ -129,12 +129,6 @@ impl LockedAxes {
         Point3::new(held(0, point.x, at.x), held(1, point.y, at.y), held(2, point.z, at.z))
     }
 
-    /// Returns true for an axis, counted from x, along which it does not move.
-    #[inline]
-    pub(crate) const fn locks_translation(self, axis: usize) -> bool {
-        self.0 >> axis & 1 != 0
-    }
-
     /// Returns true for an axis, counted from x, about which it does not turn.
     #[inline]
     pub(crate) const fn locks_rotation(self, axis: usize) -> bool {

@@ -257,14 +257,10 @@ impl<S: Scalar> SolverBodies<'_, S> {
 
     /// Change of the spin by an angular impulse (in kg m²/s), in rad/s.
     pub(super) fn spin_change(&self, row: usize, angular_impulse: Vec3<S>) -> Vec3<S> {
-        match self.capsule(row) {
-            Some(capsule) => {
-                capsule.apply_inverse_inertia(angular_impulse * self.inverse_mass[row])
-            }
-            None => {
-                let change = angular_impulse * self.inverse_inertia(row);
-                self.locked_axes(row).free_rotation(change)
-            }
+        if let Some(capsule) = self.capsule(row) {
+            capsule.apply_inverse_inertia(angular_impulse * self.inverse_mass[row])
+        } else {
+            self.locked_axes(row).free_rotation(angular_impulse * self.inverse_inertia(row))
         }
     }
 

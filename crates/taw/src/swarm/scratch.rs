@@ -6,7 +6,7 @@ use super::neighbours::NeighbourSearch;
 use super::outside_work::OutsideWork;
 use super::recorded_impulses::RecordedImpulses;
 use super::state::of;
-use super::step::{HeldRow, SavedPlace, WayToWall};
+use super::step::{LockedRows, SavedPlace, WayToWall};
 use super::sweeps::Crowd;
 use crate::joint::JointSystem;
 use crate::math::{Row, Scalar, UnionFind};
@@ -59,10 +59,8 @@ pub(super) struct SwarmScratch<S> {
     pub places: Vec<SavedPlace<S>>,
     /// Paths of kinematic bodies in the step.
     pub kinematic_paths: Vec<KinematicPath<S>>,
-    /// See [`SolverColumns::free_axes`](super::kernels::SolverColumns::free_axes).
-    pub free_axes: Vec<Row<S>>,
     /// Bodies with locked axes.
-    pub held_rows: Vec<HeldRow<S>>,
+    pub locks: LockedRows<S>,
     /// Number of the substep.
     pub substep: u32,
     /// Ways of balls that would bounce off a wall: of each chunk, and of all.
@@ -106,8 +104,7 @@ impl<S: Scalar> SwarmScratch<S> {
             path_changes,
             places,
             kinematic_paths,
-            held_rows,
-            free_axes,
+            locks,
             ways_to_walls,
             ways_of_chunks,
             with_ways,
@@ -122,10 +119,8 @@ impl<S: Scalar> SwarmScratch<S> {
             substep: _,
         } = self;
         ([column, backing].map(of).iter().sum::<usize>()
-            + (of(backing_speed) + of(leaving))
-            + of(displacements)
-            + of(proxy_rows)
-            + of(saved_proxies))
+            + (of(backing_speed) + of(leaving) + of(displacements))
+            + (of(proxy_rows) + of(saved_proxies)))
             + (of(lists) + lists.iter().chain(waking).map(of).sum::<usize>() + of(waking))
             + (of(chunk_states)
                 + islands.bytes()
@@ -138,8 +133,7 @@ impl<S: Scalar> SwarmScratch<S> {
                 + of(path_changes)
                 + of(places)
                 + of(kinematic_paths)
-                + of(held_rows)
-                + of(free_axes)
+                + locks.bytes()
                 + of(ways_to_walls)
                 + of(ways_of_chunks)
                 + with_ways.bytes()

@@ -59,7 +59,7 @@ pub(super) fn xyz<S: Scalar>(row: &Row<S>) -> Vec3<S> {
     Vec3::new(row[0], row[1], row[2])
 }
 
-fn set<S: Scalar>(row: &mut Row<S>, to: Vec3<S>) {
+pub(super) fn set<S: Scalar>(row: &mut Row<S>, to: Vec3<S>) {
     [row[0], row[1], row[2]] = to.into();
 }
 

@@ -56,9 +56,8 @@ pub(super) fn slide_along_wall<S: Scalar>(
     displacement: Vec3<S>,
 ) -> S {
     let (start, mut hits) = (moved(at, -displacement), false);
-    let end = along_path(walls, (&start, of_ball), displacement, S::zero(), &mut |_, _, _, _| {
-        hits = true
-    });
+    let ball = (&start, of_ball);
+    let end = along_path(walls, ball, displacement, S::zero(), &mut |_, _, _, _| hits = true);
     if !hits {
         return S::zero();
     }

@@ -201,8 +201,8 @@ fn what_event_driven_cannot_run_is_refused_by_name_and_changes_nothing() {
     world.marbles.set_position(free, point(1.0, 2.0, 0.0)).unwrap();
     let refused = Error::Unsupported { response: "EventDriven", feature: "locked axes" };
     let before = world.clone();
-    assert_eq!(world.step(1.0 / 60.0), Err(refused.clone()));
-    assert_eq!(world.integrate(1.0 / 60.0), Err(refused.clone()));
+    assert_eq!(world.step(1.0 / 60.0), Err(refused));
+    assert_eq!(world.integrate(1.0 / 60.0), Err(refused));
     assert!(world == before);
     assert_eq!(world.unsupported_marbles(), [(locked, refused)]);
     world.marbles.set_locked_axes(locked, LockedAxes::NONE).unwrap();

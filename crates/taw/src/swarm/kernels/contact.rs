@@ -360,23 +360,15 @@ impl<S: Scalar, const BACKED: bool, const OWN: bool, const LOCKED: bool>
                 spin[3] =
                     impulse.normal.select_gt(zero, grounded.max(L::constant(TOUCHING)), spin[3]);
             }
-            let factors = numbers.inertia_factors;
-            columns.apply_impulse::<L, BACKED, LOCKED>(
-                batch,
-                [a, b],
-                spins,
-                normal,
-                change,
-                factors,
-            );
+            let (rows, factors) = ([a, b], numbers.inertia_factors);
+            columns.apply_impulse::<L, BACKED, LOCKED>(batch, rows, spins, normal, change, factors);
             if OWN {
-                let (inertia, load) =
-                    (RollingInertia::new(places, &[a, b], factors), impulse.normal);
+                let (inertia, load) = (RollingInertia::new(places, &rows, factors), impulse.normal);
                 columns.solve_rolling(batch, &inertia, normal, load, &own[i], &mut torque[i]);
             }
             if !FIRST {
                 let (contact, mark) = ((normal, separation), (grounded, change.normal));
-                *jammed |= columns.push_apart(batch, at, [a, b], contact, &params, mark);
+                *jammed |= columns.push_apart(batch, at, rows, contact, &params, mark);
             }
         }
     }

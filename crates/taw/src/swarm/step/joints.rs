@@ -4,10 +4,10 @@ use cgmath::Zero;
 
 use crate::handle::NO_ROW;
 use crate::joint::{JointBody, JointSystem};
-use crate::math::{Row, Scalar, Vec3, cast_vector};
+use crate::math::{Scalar, Vec3, cast_vector};
 use crate::swarm::Swarm;
 use crate::swarm::kernels::{Pass, SolverParams};
-use crate::swarm::wall_contact::xyz;
+use crate::swarm::wall_contact::{set, xyz};
 
 impl<S: Scalar> Swarm<S> {
     /// Sets the joints of the next step, between bodies by their slots.
@@ -106,9 +106,4 @@ impl<S: Scalar> Swarm<S> {
         self.scratch.joints = joints;
         self.hold_rows(); // to the bit
     }
-}
-
-/// Sets the vector of a row.
-fn set<S: Scalar>(row: &mut Row<S>, Vec3 { x, y, z }: Vec3<S>) {
-    *row = [x, y, z, row[3]];
 }

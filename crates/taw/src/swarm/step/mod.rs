@@ -16,7 +16,7 @@ mod unconverged;
 mod wall_contacts;
 
 pub(super) use bounces::WayToWall;
-pub(super) use locks::HeldRow;
+pub(super) use locks::LockedRows;
 pub(super) use passages::SavedPlace;
 pub(super) use sleep::inverse_masses;
 use wall_contacts::WallPass;
@@ -236,7 +236,6 @@ impl<S: Scalar> Swarm<S> {
             self.shorten_paths();
             self.hold_rows();
             let caught = self.stop_at_walls(walls, h, gravity * (half * h * h));
-            self.hold_rows();
             self.scratch.path_changes.clear();
             self.advance_proxies(parts, true, h);
             let (skin, before, left) = (self.skin, left, left - h);
@@ -368,9 +367,9 @@ impl<S: Scalar> Swarm<S> {
     /// Changes velocities and moves the balls that are awake.
     fn integrate(&mut self, change: Row<S>, time: Row<S>, correction: Row<S>) {
         let simd_level = *self.simd_level;
-        let SwarmScratch { threads, backing, backing_speed, free_axes, .. } = &mut self.scratch;
+        let SwarmScratch { threads, backing, backing_speed, locks, .. } = &mut self.scratch;
         let columns = SolverColumns::new(
-            [&mut self.at, &mut self.velocity, &mut self.spin, backing, free_axes],
+            [&mut self.at, &mut self.velocity, &mut self.spin, backing, &mut locks.free_axes],
             [&mut self.skin_left, backing_speed],
         );
         let chunks = DisjointSlice::new(&mut self.chunks);
@@ -440,9 +439,9 @@ impl<S: Scalar> Swarm<S> {
                 of_walls.solve(pass, columns, chunk);
             }
         });
-        let SwarmScratch { backing, backing_speed, free_axes, .. } = &mut self.scratch;
+        let SwarmScratch { backing, backing_speed, locks, .. } = &mut self.scratch;
         let columns = SolverColumns::new(
-            [&mut self.at, &mut self.velocity, &mut self.spin, backing, free_axes],
+            [&mut self.at, &mut self.velocity, &mut self.spin, backing, &mut locks.free_axes],
             [&mut self.skin_left, backing_speed],
         );
         let FastMovers { batches, impulses, .. } = &mut fast_movers;
@@ -458,10 +457,10 @@ impl<S: Scalar> Swarm<S> {
         &mut self,
         job: impl Fn(Option<(bool, S)>, SolverColumns<S>, &mut Chunk<S>) + Sync,
     ) {
-        let SwarmScratch { threads, chunk_states, backing, backing_speed, free_axes, .. } =
+        let SwarmScratch { threads, chunk_states, backing, backing_speed, locks, .. } =
             &mut self.scratch;
         let columns = SolverColumns::new(
-            [&mut self.at, &mut self.velocity, &mut self.spin, backing, free_axes],
+            [&mut self.at, &mut self.velocity, &mut self.spin, backing, &mut locks.free_axes],
             [&mut self.skin_left, backing_speed],
         );
         let chunks = DisjointSlice::new(&mut self.chunks);
