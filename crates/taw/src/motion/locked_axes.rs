@@ -28,7 +28,12 @@ use crate::math::{Point3, Scalar, Vec3, normalize_and_length};
 /// - Friction along an axis about or along which the marble is locked is found in some passes instead of
 ///   one: its effective mass is that of a free marble.
 /// - A normal within a thousandth of a radian of the locked directions presses on the lock alone.
-/// - No lock adds energy. Momentum along free axes is conserved as without locks.
+/// - No lock adds energy. Momentum along free axes is conserved as without locks. Of `SoftStep`, a ball that a
+///   locked one wedges against a wall, with friction of nearly one, may be thrown out, as one that walls
+///   squeeze: of 3,000 random scenes of a few marbles in a room, six gain over 1.5e-3 of their energy, and
+///   none 4 % (`cargo test -p taw --test response wedged`).
+/// - A capsule about two free axes keeps its angular momentum about these in each substep, and loses the
+///   energy that this would add.
 /// - [`EventDriven`](crate::response::Response::EventDriven) refuses worlds with locked axes.
 ///
 /// ```
