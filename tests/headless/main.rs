@@ -18,6 +18,7 @@ mod interpolation;
 mod joints;
 mod layers;
 mod lifts;
+mod locked_axes;
 mod mesh_walls;
 mod motion;
 mod moving_walls;

@@ -327,6 +327,7 @@ fn every_public_component_and_resource_has_a_row() {
         "IgnoreCollisions",
         "IgnoredComponents",
         "Kinematic",
+        "LockedAxes",
         "MarbleIntegrator",
         "MarbleRotation",
         "MeshWalls",

@@ -7,6 +7,7 @@ use taw::response::{Combine, Elasticity, Material};
 use taw::world::{MarbleId, Mass, SensorId, WallId, WallShape};
 
 use crate::layers::CollisionLayers;
+use crate::locked_axes::LockedAxes;
 use crate::reflect::{CombineReflect, IntegratorReflect, RotationReflect};
 use crate::wall_motion::PoseTracker;
 
@@ -314,6 +315,7 @@ pub(crate) struct SeenMarble {
     pub material: Option<([u32; 7], Combine)>,
     pub integrator: Option<Integrator>,
     pub rotation_model: Option<Rotation>,
+    pub locked_axes: LockedAxes,
     pub layers: CollisionLayers,
     pub sleeping_disabled: bool,
 }

@@ -17,6 +17,7 @@ use crate::convert::{to_point, to_rotation, to_vector};
 use crate::diagnostics::StepTimes;
 use crate::ignore::ColliderDisabled;
 use crate::layers::CollisionLayers;
+use crate::locked_axes::LockedAxes;
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::snapshot::{self, RowRemoved};
@@ -74,6 +75,7 @@ type OptionalComponents<'a> = (
     Option<&'a SurfaceMaterial>,
     Option<&'a MarbleIntegrator>,
     Option<&'a MarbleRotation>,
+    Option<&'a LockedAxes>,
     Option<&'a SleepingDisabled>,
     Option<&'a CollisionLayers>,
     Option<&'a ColliderDisabled>,
@@ -91,6 +93,7 @@ impl SeenMarble {
             material,
             integrator,
             rotation_model,
+            locked_axes,
             sleeping_disabled,
             layers,
             disabled,
@@ -108,6 +111,7 @@ impl SeenMarble {
             material: material.map(SurfaceMaterial::bits),
             integrator: integrator.map(|i| **i),
             rotation_model: rotation_model.map(|r| **r),
+            locked_axes: locked_axes.copied().unwrap_or_default(),
             layers: if disabled.is_some() {
                 CollisionLayers::NONE
             } else {
@@ -161,6 +165,7 @@ type WrittenAsleep = (
         Changed<SurfaceMaterial>,
         Changed<MarbleIntegrator>,
         Changed<MarbleRotation>,
+        Changed<LockedAxes>,
         Changed<SleepingDisabled>,
         Changed<CollisionLayers>,
         Changed<ColliderDisabled>,
@@ -230,6 +235,7 @@ fn find_stale(
     let begins_to_turn = last.rotation == Rotation::None && model.rotation != Rotation::None;
     // What could be no marble may be one now.
     let knows_capsules = !last.response.knows_capsules() && model.response.knows_capsules();
+    let knows_locks = !last.response.knows_locked_axes() && model.response.knows_locked_axes();
     let any = AtomicBool::new(false);
     let (rows, restored) = (&world.marbles, world.just_restored);
     let look = |(_, marble, transform, optional, _, mut state): MarbleItem| {
@@ -238,6 +244,9 @@ fn find_stale(
         }
         if knows_capsules && optional.0.is_some() {
             (state.seen.half_length, state.refused) = (None, false);
+        }
+        if knows_locks {
+            state.refused = false;
         }
         if state.id.is_some_and(|id| rows.row(id).is_err()) {
             (state.id, state.refused) = (None, false); // it was away, or somebody took it out
@@ -252,7 +261,8 @@ fn find_stale(
         }
     };
     // What sleeps is looked at only where it was written.
-    let all = begins_to_turn || knows_capsules || restored || last.marbles != rows.len();
+    let knows_more = knows_capsules || knows_locks;
+    let all = begins_to_turn || knows_more || restored || last.marbles != rows.len();
     match (all, rows.len() >= MANY, queries.p2().iter().len() >= MANY) {
         (true, false, _) => queries.p0().iter_mut().for_each(look),
         (true, true, _) => queries.p0().par_iter_mut().for_each(look),
@@ -349,6 +359,7 @@ fn to_core(
         integrator: seen.integrator,
         rotation_model: seen.rotation_model,
         material: material.map(|m| (*m).into()),
+        locked_axes: seen.locked_axes.into(),
         layers: seen.layers.into(),
         sleeping_disabled: seen.sleeping_disabled,
     }
@@ -428,6 +439,9 @@ fn update(
     if all || seen.integrator != last.integrator {
         set(marbles.set_integrator(id, now.integrator));
     }
+    if all || seen.locked_axes != last.locked_axes {
+        set(marbles.set_locked_axes(id, now.locked_axes));
+    }
     if all || seen.layers != last.layers {
         set(marbles.set_layers(id, now.layers));
     }
@@ -462,22 +476,6 @@ pub fn forces(
             refusals.check(Some(entity), world.marbles.apply_angular_impulse(id, angular));
             *hit = ExternalImpulse::default();
         }
-    }
-}
-
-/// Leaves marbles out of the world by which it would refuse to step, until they change.
-pub fn leave_out(
-    mut world: ResMut<TawWorld>,
-    mut states: Query<&mut MarbleState>,
-    mut refusals: Refusals,
-) {
-    for (id, error) in world.unsupported_marbles() {
-        let _ = world.marbles.remove(id); // it is there: the world named it
-        let Some(entity) = world.marble_entities.remove(&id) else { continue };
-        if let Ok(mut state) = states.get_mut(entity) {
-            (state.id, state.refused) = (None, true);
-        }
-        refusals.check(Some(entity), Err(error));
     }
 }
 

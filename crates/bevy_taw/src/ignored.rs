@@ -17,6 +17,7 @@ use crate::contact_force::ContactForce;
 use crate::controller::MarbleController;
 use crate::grounded::Grounded;
 use crate::ignore::{ColliderDisabled, IgnoreCollisions, OneWay};
+use crate::locked_axes::LockedAxes;
 use crate::pair_filter::{FilterPairs, PairFilter};
 use crate::resources::TawWorld;
 use crate::sensor::Sensor;
@@ -118,7 +119,7 @@ impl<'a> Carriers<'a> {
     }
 
     /// Each name of a component that has no effect where it is, and true if an entity has it there.
-    fn of_places(&self, has_filter: bool) -> [(&'static str, bool); 20] {
+    fn of_places(&self, has_filter: bool) -> [(&'static str, bool); 21] {
         let (marbles, walls) = (&self.marbles, &self.walls);
         let is_marked = self.any::<FilterPairs>(marbles) || self.any::<FilterPairs>(walls);
         [
@@ -133,6 +134,7 @@ impl<'a> Carriers<'a> {
             ("HalfLength of a wall", self.any::<HalfLength>(walls)),
             ("MarbleIntegrator of a wall", self.any::<MarbleIntegrator>(walls)),
             ("MarbleRotation of a wall", self.any::<MarbleRotation>(walls)),
+            ("LockedAxes of a wall", self.any::<LockedAxes>(walls)),
             ("MarbleController of a wall", self.any::<MarbleController>(walls)),
             ("Grounded of a wall", self.any::<Grounded>(walls)),
             ("IgnoreCollisions of a wall", self.any::<IgnoreCollisions>(walls)),

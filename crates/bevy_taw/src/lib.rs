@@ -184,6 +184,7 @@ pub mod ignored;
 pub mod interpolation;
 pub mod joint;
 pub mod layers;
+pub mod locked_axes;
 #[cfg(feature = "mesh")]
 pub mod mesh_walls;
 pub mod messages;
@@ -237,6 +238,7 @@ pub mod prelude {
         Joint, JointBroken, JointDrive, JointEnd, JointKind, JointMotor, JointSpring,
     };
     pub use crate::layers::{CollisionLayers, LayerMask, PhysicsLayer};
+    pub use crate::locked_axes::LockedAxes;
     #[cfg(feature = "mesh")]
     pub use crate::mesh_walls::{MeshShape, MeshWalls};
     pub use crate::messages::{

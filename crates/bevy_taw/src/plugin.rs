@@ -19,6 +19,7 @@ use crate::ignored::{self, IgnoredComponents};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::joint::{Joint, JointBroken};
 use crate::layers::CollisionLayers;
+use crate::locked_axes::LockedAxes;
 use crate::pair_filter::{self, FilterPairs, FilteredPairs};
 use crate::refusal::{self, InputRefused, MarbleStopped, Refusals, Told, report};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
@@ -161,7 +162,7 @@ impl Plugin for TawPlugin {
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
             .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
             .register_type::<(Grounded, ContactForce, MarbleController, GravityZone, WindZone)>()
-            .register_type::<(IgnoreCollisions, ColliderDisabled, OneWay, FilterPairs)>()
+            .register_type::<(IgnoreCollisions, ColliderDisabled, OneWay, FilterPairs, LockedAxes)>()
             .register_type::<(TawModel, TawSwarmModel, Gravity, Forces, IgnoredComponents)>()
             .register_type::<(SubstepDelta, SurfaceVelocity, Swarm, Body, Joint)>();
         diagnostics::register(app);
@@ -183,6 +184,7 @@ fn observe(app: &mut App) {
         .add_observer(gather::note_lost_component::<SurfaceMaterial>)
         .add_observer(gather::note_lost_component::<MarbleIntegrator>)
         .add_observer(gather::note_lost_component::<MarbleRotation>)
+        .add_observer(gather::note_lost_component::<LockedAxes>)
         .add_observer(gather::note_lost_component::<SleepingDisabled>)
         .add_observer(gather::note_lost_component::<CollisionLayers>)
         .add_observer(gather::note_lost_component::<ColliderDisabled>)
@@ -271,7 +273,7 @@ fn add_gather(app: &mut App) {
             joint::gather.run_if(any_with_component::<Joint>),
             gather::forces,
             zones::act,
-            gather::leave_out,
+            refusal::leave_out,
             swarm::gather,
             gather_walls::land,
             gather::finish,

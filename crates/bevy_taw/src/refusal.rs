@@ -7,6 +7,7 @@ use bevy::prelude::*;
 use taw::response::Response;
 use taw::world::StopReason;
 
+use crate::components::MarbleState;
 use crate::reflect::StopReasonReflect;
 use crate::resources::TawWorld;
 
@@ -120,6 +121,22 @@ pub(crate) fn report_stopped(world: Res<TawWorld>, mut stopped: MessageWriter<Ma
             log::warn!("taw stopped {entity}: {cause}");
             stopped.write(MarbleStopped { entity, reason });
         }
+    }
+}
+
+/// Leaves marbles out of the world by which it would refuse to step, until they change.
+pub(crate) fn leave_out(
+    mut world: ResMut<TawWorld>,
+    mut states: Query<&mut MarbleState>,
+    mut refusals: Refusals,
+) {
+    for (id, error) in world.unsupported_marbles() {
+        let _ = world.marbles.remove(id); // it is there: the world named it
+        let Some(entity) = world.marble_entities.remove(&id) else { continue };
+        if let Ok(mut state) = states.get_mut(entity) {
+            (state.id, state.refused) = (None, true);
+        }
+        refusals.check(Some(entity), Err(error));
     }
 }
 

@@ -80,7 +80,7 @@ pub mod prelude {
     pub use crate::broad::CollisionLayers;
     pub use crate::contact::{Contact, Contacts};
     pub use crate::math::{Point3, Scalar, Vec3};
-    pub use crate::motion::{ForceField, Integrator, Rotation};
+    pub use crate::motion::{ForceField, Integrator, LockedAxes, Rotation};
     pub use crate::response::{Combine, ContactLaw, Material, Response};
     pub use crate::shape::{Plane, Sphere};
     pub use crate::world::{

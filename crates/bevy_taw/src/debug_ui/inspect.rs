@@ -173,6 +173,7 @@ fn rows_of_marble(ui: &mut Ui, marble: &taw::world::Marble<f32>) {
     row(ui, "Gravity scale", marble.gravity_scale);
     let taw::world::Damping { linear, angular } = marble.damping;
     row(ui, "Damping", format!("{linear}, of spin {angular} 1/s"));
+    row(ui, "Locked axes", format!("{:06b} (rotation, motion: z y x)", marble.locked_axes.bits()));
 }
 
 /// Rows of a material, or the name of what counts without one.

@@ -10,7 +10,7 @@ use crate::frame::Pose;
 use crate::handle::{BodyId, WallId};
 use crate::math::Vec3;
 
-/// BodyPartner of a body in a contact, in the order in which contacts are solved: walls last, so that nothing is pushed into
+/// Partner of a body in a contact, in the order in which contacts are solved: walls last, so that nothing is pushed into
 /// them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum BodyPartner {
@@ -33,7 +33,7 @@ pub(crate) struct BodyContactKey {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct BodyContact {
     pub key: BodyContactKey,
-    /// BodyPartner and body, by index in the solver.
+    /// Partner and body, by index in the solver.
     pub bodies: [u32; 2],
     /// Unit normal, from the partner to the body.
     pub normal: Vec3<f64>,

@@ -6,7 +6,7 @@ use super::rows::{RowGeometry, RowRule};
 use crate::body::turned_freely;
 use crate::frame::Pose;
 use crate::math::{Mat3, Vec3};
-use crate::motion::integrate_rotation;
+use crate::motion::{LockedAxes, integrate_rotation};
 
 /// Largest error that a substep removes, in units of the smaller radius, and in rad.
 const MAX_CORRECTION: f64 = 1.0;
@@ -30,6 +30,8 @@ pub(crate) struct JointBody {
     /// turns.
     pub inverse_mass: f64,
     pub inverse_moments: Vec3<f64>,
+    /// Axes of the world that it neither moves along nor turns about.
+    pub locked_axes: LockedAxes,
     /// Center of mass, and rotation of the principal axes.
     pub pose: Pose<f64>,
     /// Velocity in m/s, and angular velocity in rad/s.
@@ -82,6 +84,7 @@ impl JointBody {
             owner: JointOwner::Place,
             inverse_mass: 0.0,
             inverse_moments: Vec3::zero(),
+            locked_axes: LockedAxes::NONE,
             pose,
             velocity: Vec3::zero(),
             spin: Vec3::zero(),
@@ -156,8 +159,9 @@ impl JointBody {
     }
 
     pub fn apply(&mut self, linear: Vec3<f64>, angular: Vec3<f64>) {
-        self.velocity += linear * self.inverse.mass;
-        self.spin += self.inverse.tensor * angular;
+        let turn = self.inverse.tensor * angular;
+        self.velocity += self.locked_axes.free_translation(linear * self.inverse.mass);
+        self.spin += self.locked_axes.free_rotation(turn);
     }
 }
 
@@ -208,6 +212,8 @@ impl JointRow {
             for its in (0..2).filter(|its| other.bodies[*its] == self.bodies[end]) {
                 let body = &bodies[self.bodies[end] as usize];
                 let ([a, b], [c, d]) = (self.jacobian(end), other.jacobian(its));
+                let (c, d) =
+                    (body.locked_axes.free_translation(c), body.locked_axes.free_rotation(d));
                 sum += a.dot(c) * body.inverse.mass + b.dot(body.inverse.tensor * d);
             }
         }

@@ -4,7 +4,8 @@ use cgmath::{InnerSpace, Zero};
 
 use super::{BallRotation, InverseEffectiveMass};
 use crate::broad::Period;
-use crate::math::{Point3, Scalar, Vec3};
+use crate::math::{Point3, Scalar, Vec3, is_finite_point};
+use crate::motion::LockedAxes;
 
 /// Columns of the bodies that a solver works on; all of one length.
 #[derive(Debug)]
@@ -23,6 +24,8 @@ pub(crate) struct SolverBodies<'a, S> {
     pub spin: &'a mut [Vec3<S>],
     /// Rows whose rotation is locked: contacts cannot spin them. Empty if there are none.
     pub rotation_locked: &'a [bool],
+    /// Locked axes of each row; empty if there are none.
+    pub locked_axes: &'a [LockedAxes],
     /// Capsule axis and inertia per body; empty if all are spheres.
     pub capsules: &'a [CapsuleInertia<S>],
 }
@@ -37,6 +40,8 @@ pub(crate) struct CapsuleInertia<S> {
     /// Mass over the axial and the transverse moment of inertia, in 1/m²; zero if the rotation is
     /// locked.
     pub inverse_unit_inertia: [S; 2],
+    /// Axes of the world about which it does not turn.
+    pub locked_axes: LockedAxes,
 }
 
 impl<S: Scalar> CapsuleInertia<S> {
@@ -52,9 +57,55 @@ impl<S: Scalar> CapsuleInertia<S> {
 
     /// Change of angular velocity by a torque impulse per mass about the center.
     pub fn apply_inverse_inertia(&self, torque: Vec3<S>) -> Vec3<S> {
+        let free = self.scale(torque, self.inverse_unit_inertia);
+        if self.locked_axes.turns_freely() { free } else { self.locked_spin(free, torque) }
+    }
+
+    /// Angular velocity that locks leave of one that is set from outside, by an impulse of theirs: none
+    /// gains energy.
+    pub fn constrained(&self, spin: Vec3<S>) -> Vec3<S> {
+        if self.locked_axes.free_rotation(spin) == spin {
+            return spin; // to the bit
+        }
+        self.locked_spin(spin, self.momentum(spin))
+    }
+
+    /// Angular momentum per mass, in m²/s; of a rotation that is not locked.
+    pub fn momentum(&self, spin: Vec3<S>) -> Vec3<S> {
+        self.scale(spin, self.inverse_unit_inertia.map(S::recip))
+    }
+
+    /// Multiplies the parts of an axial vector along the axis and across it.
+    fn scale(&self, v: Vec3<S>, [axial, transverse]: [S; 2]) -> Vec3<S> {
+        let part = self.axis * v.dot(self.axis);
+        part * axial + (v - part) * transverse
+    }
+
+    /// Angular velocity of a capsule with locked axes, given that of a free one with the same angular
+    /// momentum per mass: locks change only the momentum about their own axes.
+    fn locked_spin(&self, spin: Vec3<S>, momentum: Vec3<S>) -> Vec3<S> {
+        let (zero, locks) = (Vec3::zero(), self.locked_axes);
         let [axial, transverse] = self.inverse_unit_inertia;
-        let part = self.axis * torque.dot(self.axis);
-        part * axial + (torque - part) * transverse
+        if axial == S::zero() || transverse == S::zero() {
+            return zero;
+        }
+        let mut only = zero; // unit vector of the only locked or free axis
+        let locked = (0..3).filter(|axis| locks.locks_rotation(*axis)).count();
+        let index = (0..3).find(|axis| locks.locks_rotation(*axis) == (locked == 1));
+        match (locked, index) {
+            (0, _) => spin,
+            (1, Some(axis)) => {
+                only[axis] = S::one();
+                let column = self.scale(only, self.inverse_unit_inertia);
+                locks.free_rotation(spin - column * (spin[axis] / column[axis]))
+            }
+            (2, Some(axis)) => {
+                only[axis] = S::one();
+                let inertia = self.scale(only, [axial.recip(), transverse.recip()]);
+                only * (momentum[axis] / inertia[axis])
+            }
+            _ => zero,
+        }
     }
 }
 
@@ -87,6 +138,20 @@ impl<S: Scalar> SolverBodies<'_, S> {
         factor * self.inverse_mass[row] / (self.radius[row] * self.radius[row])
     }
 
+    /// Locked axes of a row.
+    #[inline]
+    pub(super) fn locked_axes(&self, row: usize) -> LockedAxes {
+        self.locked_axes.get(row).copied().unwrap_or_default()
+    }
+
+    /// Moves a row along its free axes. One that would become infinite or NaN stays.
+    pub(super) fn displace(&mut self, row: usize, displacement: Vec3<S>) {
+        let position = self.position[row] + self.locked_axes(row).free_translation(displacement);
+        if is_finite_point(position) {
+            self.position[row] = position;
+        }
+    }
+
     /// Vector from the center of a row to the point of its axis that a contact refers to.
     #[inline]
     pub(super) fn anchor(&self, row: usize, axis_offset: S) -> Vec3<S> {
@@ -107,17 +172,20 @@ impl<S: Scalar> SolverBodies<'_, S> {
         normal: Vec3<S>,
     ) -> InverseEffectiveMass<S> {
         let inverse_mass = self.inverse_mass[row];
+        let share = self.locked_axes(row).share(normal);
         let Some(capsule) = self.capsule(row) else {
-            return InverseEffectiveMass::of([
+            let free = InverseEffectiveMass::of([
                 (S::zero(), BallRotation::Locked),
                 (inverse_mass, self.ball_rotation(row)),
             ]);
+            // Along the tangents an upper bound, as for capsules.
+            return InverseEffectiveMass { normal: free.normal * share, ..free };
         };
         let lever = arm.cross(normal);
         let [axial, transverse] = capsule.inverse_unit_inertia;
         let max_inverse = axial.max(transverse);
         InverseEffectiveMass {
-            normal: inverse_mass * (S::one() + lever.dot(capsule.apply_inverse_inertia(lever))),
+            normal: inverse_mass * (share + lever.dot(capsule.apply_inverse_inertia(lever))),
             // Upper bound, so that a tangential step never overshoots.
             tangent: inverse_mass * (S::one() + max_inverse * arm.magnitude2()),
         }
@@ -150,14 +218,16 @@ impl<S: Scalar> SolverBodies<'_, S> {
         normal: Vec3<S>,
         arm: Vec3<S>,
     ) {
+        let locks = self.locked_axes(row);
         if self.capsule(row).is_some() {
-            self.velocity[row] += velocity_change;
+            self.velocity[row] += locks.free_translation(velocity_change);
             return self.spin_capsule(row, velocity_change, arm);
         }
         let spin_per_speed = self.spin_per_speed(row);
         let mut no_spin = Vec3::zero();
         let spin = self.spin.get_mut(row).unwrap_or(&mut no_spin);
-        push(&mut self.velocity[row], spin, velocity_change, normal, spin_per_speed);
+        let velocity = &mut self.velocity[row];
+        push_locked(velocity, spin, velocity_change, normal, (spin_per_speed, locks));
     }
 
     /// Applies the angular part of an impulse to a capsule.
@@ -170,11 +240,10 @@ impl<S: Scalar> SolverBodies<'_, S> {
 
     /// Change of the spin by an angular impulse (in kg m²/s), in rad/s.
     pub(super) fn spin_change(&self, row: usize, angular_impulse: Vec3<S>) -> Vec3<S> {
-        match self.capsule(row) {
-            Some(capsule) => {
-                capsule.apply_inverse_inertia(angular_impulse * self.inverse_mass[row])
-            }
-            None => angular_impulse * self.inverse_inertia(row),
+        if let Some(capsule) = self.capsule(row) {
+            capsule.apply_inverse_inertia(angular_impulse * self.inverse_mass[row])
+        } else {
+            self.locked_axes(row).free_rotation(angular_impulse * self.inverse_inertia(row))
         }
     }
 
@@ -209,6 +278,24 @@ pub(super) fn push<S: Scalar>(
 ) {
     *velocity += change;
     *spin -= normal.cross(change) * spin_per_speed;
+}
+
+/// Changes the velocity of a ball, and its spin, as [`push`] does, by what its locks leave.
+#[inline]
+pub(super) fn push_locked<S: Scalar>(
+    velocity: &mut Vec3<S>,
+    spin: &mut Vec3<S>,
+    change: Vec3<S>,
+    normal: Vec3<S>,
+    (spin_per_speed, locks): (S, LockedAxes),
+) {
+    if locks.is_empty() {
+        return push(velocity, spin, change, normal, spin_per_speed);
+    }
+    let (mut faster, mut turned) = (Vec3::zero(), Vec3::zero());
+    push(&mut faster, &mut turned, change, normal, spin_per_speed);
+    *velocity += locks.free_translation(faster);
+    *spin += locks.free_rotation(turned);
 }
 
 /// Relative velocity at a contact: that of the second body's contact point minus the first's, or

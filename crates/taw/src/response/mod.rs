@@ -139,6 +139,13 @@ impl Response {
         !matches!(self, Self::EventDriven | Self::SoftStep)
     }
 
+    /// Returns false for responses that refuse marbles with
+    /// [locked axes](crate::motion::LockedAxes).
+    #[must_use]
+    pub fn knows_locked_axes(self) -> bool {
+        self != Self::EventDriven
+    }
+
     /// True if only contacts with penetration matter: no speculative margin.
     pub(crate) fn needs_penetration(self) -> bool {
         matches!(self, Self::Penalty(_))

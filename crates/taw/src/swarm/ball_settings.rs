@@ -68,7 +68,7 @@ impl<S: Scalar> Swarm<S> {
     ) -> Result<(), Error> {
         let slot = self.own_slot(ball)?;
         let material = material.map(Material::validated).transpose()?;
-        let surface = material.map(|material| BallSurface { material, rotation_locked: false });
+        let surface = material.map(BallSurface::free);
         if self.surfaces.set(slot, surface) {
             self.wake(self.row(ball)?);
             self.forget_contacts();

@@ -6,7 +6,7 @@ use super::neighbours::NeighbourSearch;
 use super::outside_work::OutsideWork;
 use super::recorded_impulses::RecordedImpulses;
 use super::state::of;
-use super::step::{SavedPlace, WayToWall};
+use super::step::{LockedRows, SavedPlace, WayToWall};
 use super::sweeps::Crowd;
 use crate::body::BodySystem;
 use crate::joint::JointSystem;
@@ -60,6 +60,8 @@ pub(super) struct SwarmScratch<S> {
     pub places: Vec<SavedPlace<S>>,
     /// Paths of kinematic bodies in the step.
     pub kinematic_paths: Vec<KinematicPath<S>>,
+    /// Bodies with locked axes.
+    pub locks: LockedRows<S>,
     /// Number of the substep.
     pub substep: u32,
     /// Ways of balls that would bounce off a wall: of each chunk, and of all.
@@ -104,6 +106,7 @@ impl<S: Scalar> SwarmScratch<S> {
             path_changes,
             places,
             kinematic_paths,
+            locks,
             ways_to_walls,
             ways_of_chunks,
             with_ways,
@@ -133,13 +136,12 @@ impl<S: Scalar> SwarmScratch<S> {
                 + of(path_changes)
                 + of(places)
                 + of(kinematic_paths)
+                + locks.bytes()
                 + of(ways_to_walls)
                 + of(ways_of_chunks)
                 + with_ways.bytes()
                 + ways_of_chunks.iter().map(of).sum::<usize>()
-                + held.bytes()
-                + of(impacts)
-                + of(outside_work)
+                + (held.bytes() + of(impacts) + of(outside_work))
                 + recorded_impulses.as_ref().map_or(0, RecordedImpulses::bytes))
     }
 }

@@ -4,18 +4,25 @@ use super::batches::Batch;
 use super::bit_set::BitSet;
 use crate::broad::{CollisionFilter, CollisionLayers, IgnoredPairs};
 use crate::math::{LANES, Scalar};
-use crate::motion::BALL_INVERSE_INERTIA;
+use crate::motion::{BALL_INVERSE_INERTIA, LockedAxes};
 use crate::response::Material;
 use crate::uncompared::Uncompared;
 
-/// Surface of a ball: its material, and whether contacts can set it spinning.
+/// Surface of a ball: its material, and how contacts can move it and set it spinning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BallSurface<S> {
     pub material: Material<S>,
     pub rotation_locked: bool,
+    /// Axes of the world that it neither moves along nor turns about.
+    pub locked_axes: LockedAxes,
 }
 
 impl<S: Scalar> BallSurface<S> {
+    /// Surface of a ball that contacts move and spin.
+    pub fn free(material: Material<S>) -> Self {
+        Self { material, rotation_locked: false, locked_axes: LockedAxes::NONE }
+    }
+
     /// Mass times radius squared over the moment of inertia; zero where the rotation is locked.
     fn inertia_factor(self) -> S {
         if self.rotation_locked { S::zero() } else { S::from_f64(BALL_INVERSE_INERTIA) }
@@ -36,6 +43,8 @@ pub(super) struct Surfaces<S> {
     layers: Vec<CollisionLayers>,
     /// Pairs of marbles' slots, and of those with walls, that pass through each other.
     pub ignored: Uncompared<IgnoredPairs>,
+    /// Slots of marbles with locked axes.
+    locked: BitSet,
     /// Slots of kinematic marbles, whose mass is infinite: they pass through walls and each other.
     kinematic: BitSet,
 }
@@ -69,6 +78,11 @@ impl<S: Scalar> Surfaces<S> {
         self.kinematic.contains(slot)
     }
 
+    /// Slots of marbles with locked axes, in order, and these.
+    pub fn locked(&self) -> impl Iterator<Item = (u32, LockedAxes)> + '_ {
+        self.locked.iter().filter_map(|slot| Some((slot, self.get(slot)?.locked_axes)))
+    }
+
     /// Layers of a slot.
     #[inline]
     pub fn layers(&self, slot: u32) -> CollisionLayers {
@@ -89,6 +103,11 @@ impl<S: Scalar> Surfaces<S> {
             });
             index as u32 + 1
         });
+        if surface.is_some_and(|surface| !surface.locked_axes.is_empty()) {
+            self.locked.insert(slot);
+        } else {
+            self.locked.remove(slot);
+        }
         let slot = slot as usize;
         if index == 0 && slot >= self.of_slot.len() {
             return false;
@@ -113,14 +132,15 @@ impl<S: Scalar> Surfaces<S> {
         self.list.get((index as usize).checked_sub(1)?).copied()
     }
 
-    /// Material of all balls, where they have one in common; and nobody's rotation is
+    /// Material of all balls, where they have one in common, and nobody's rotation or axes are
     /// locked.
     pub fn common(&self, model: Material<S>, balls: usize) -> Option<Material<S>> {
         let used = || self.counts.iter().zip(&self.list).filter(|(count, _)| **count > 0);
         match used().next() {
             None => Some(model),
             Some((count, surface)) => {
-                let all = *count as usize == balls && !surface.rotation_locked;
+                let is_plain = !surface.rotation_locked && surface.locked_axes.is_empty();
+                let all = *count as usize == balls && is_plain;
                 all.then_some(surface.material)
             }
         }
@@ -130,7 +150,7 @@ impl<S: Scalar> Surfaces<S> {
         self.list.capacity() * size_of::<BallSurface<S>>()
             + (self.counts.capacity() + self.of_slot.capacity()) * size_of::<u32>()
             + self.layers.capacity() * size_of::<CollisionLayers>()
-            + (self.ignored.bytes() + self.kinematic.bytes())
+            + (self.ignored.bytes() + self.kinematic.bytes() + self.locked.bytes())
     }
 }
 
@@ -148,8 +168,14 @@ impl<S: Scalar> SurfaceOf<'_, S> {
     #[inline]
     pub fn row(&self, row: u32) -> BallSurface<S> {
         let own = || self.surfaces.get(self.slots[row as usize]);
-        let plain = BallSurface { material: self.model, rotation_locked: false };
+        let plain = BallSurface::free(self.model);
         if self.surfaces.list.is_empty() { plain } else { own().unwrap_or(plain) }
+    }
+
+    /// Locked axes of the ball in a row.
+    #[inline]
+    pub fn locked_axes(&self, row: u32) -> LockedAxes {
+        if self.surfaces.locked.is_empty() { LockedAxes::NONE } else { self.row(row).locked_axes }
     }
 
     /// True if some balls may not collide with all others.
@@ -267,6 +293,8 @@ pub(super) struct WallNumbers<S> {
     pub spinning_resistance: S,
     /// Mass times radius squared over the moment of inertia of the ball; zero where locked.
     pub inertia_factor: S,
+    /// Locked axes of the ball.
+    pub locked_axes: LockedAxes,
 }
 
 impl<S: Scalar> WallNumbers<S> {
@@ -280,6 +308,7 @@ impl<S: Scalar> WallNumbers<S> {
             rolling_resistance: material.rolling_resistance,
             spinning_resistance: material.spinning_resistance,
             inertia_factor: ball.inertia_factor(),
+            locked_axes: ball.locked_axes,
         }
     }
 }

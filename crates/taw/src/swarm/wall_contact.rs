@@ -59,11 +59,21 @@ pub(super) fn xyz<S: Scalar>(row: &Row<S>) -> Vec3<S> {
     Vec3::new(row[0], row[1], row[2])
 }
 
-fn set<S: Scalar>(row: &mut Row<S>, to: Vec3<S>) {
+pub(super) fn set<S: Scalar>(row: &mut Row<S>, to: Vec3<S>) {
     [row[0], row[1], row[2]] = to.into();
 }
 
 impl<S: Scalar> WallContact<S> {
+    /// Inverse mass of the ball along the normal, over that of a free one; zero if locks bear the contact.
+    pub fn share(&self) -> S {
+        self.numbers.locked_axes.share(self.normal)
+    }
+
+    /// Way of the ball until it is nearer to the wall by so many metres.
+    pub fn way_nearer(&self, by: S) -> Vec3<S> {
+        self.numbers.locked_axes.escape(self.normal) * -by
+    }
+
     pub fn separation(&self, at: &Row<S>) -> S {
         self.normal.dot(xyz(at)) - self.offset - at[3]
     }
@@ -153,15 +163,16 @@ impl<S: Scalar> WallContact<S> {
     /// Moves the ball out.
     pub fn displace(&self, at: &mut Row<S>) {
         let overlap = (-self.separation(at)).max(S::zero());
-        set(at, xyz(at) + self.normal * overlap);
+        set(at, xyz(at) - self.way_nearer(overlap));
     }
 
     /// Moves the ball out, except for the overlap that a contact bears. Returns the distance, in metres.
     pub fn keep_out(&self, at: &mut Row<S>) -> S {
         // All of it: a wall gives way to nobody.
         let overlap = (-self.separation(at) - at[3] * S::from_f64(WALL_SLOP)).max(S::zero());
-        set(at, xyz(at) + self.normal * overlap);
-        overlap
+        let push = self.way_nearer(-overlap);
+        set(at, xyz(at) + push);
+        if self.numbers.locked_axes.moves_freely() { overlap } else { push.magnitude() }
     }
 
     /// A pass as for the pairs of balls. Returns the bounce if there was one: then it moved the ball by its
@@ -173,6 +184,9 @@ impl<S: Scalar> WallContact<S> {
         velocity: &mut Row<S>,
         spin: &mut Row<S>,
     ) -> Option<Bounce<S>> {
+        if self.share() == S::zero() {
+            return None;
+        }
         match pass {
             Pass::Restitution(params) => {
                 return self.apply_restitution(&params, at, velocity, spin);
@@ -183,7 +197,8 @@ impl<S: Scalar> WallContact<S> {
                 self.impulse = self.cone().clamp(ContactImpulse { tangent, ..self.impulse });
                 self.apply_impulse(velocity, spin, self.impulse);
                 let give = self.numbers.inertia_factor * velocity[3];
-                set(spin, xyz(spin) + self.torque * give);
+                let turn = self.numbers.locked_axes.free_rotation(self.torque * give);
+                set(spin, xyz(spin) + turn);
             }
             Pass::Solve(params) => {
                 self.push(params.time, Some(params.softness), at, velocity, spin);
@@ -203,6 +218,11 @@ impl<S: Scalar> WallContact<S> {
         None
     }
 
+    /// Acceleration of the ball by gravity, in m/s².
+    fn fall(&self, params: &SolverParams<S>) -> Vec3<S> {
+        self.numbers.locked_axes.free_translation(xyz(&params.gravity))
+    }
+
     /// Finds out if the ball meets the wall within a substep, fast enough to bounce.
     fn approach(
         &self,
@@ -214,7 +234,7 @@ impl<S: Scalar> WallContact<S> {
         let separation = self.separation(at).max(S::zero());
         // Gravity works on the ball as far as it comes nearer. As far as the contact reaches, by the
         // velocity after gravity: one that only stops the ball would take its bounce.
-        let gravity = -xyz(&params.gravity).dot(self.normal);
+        let gravity = -self.fall(params).dot(self.normal);
         let nearer = (speed + gravity * params.time) * params.time;
         if speed <= S::zero() || separation >= nearer {
             return None;
@@ -240,7 +260,7 @@ impl<S: Scalar> WallContact<S> {
     ) -> Option<(Vec3<S>, [S; 2])> {
         self.approach(params, at, velocity)?;
         let time = params.time;
-        let displacement = xyz(velocity) * time + xyz(&params.gravity) * (time * time);
+        let displacement = xyz(velocity) * time + self.fall(params) * (time * time);
         let way = (displacement, [before_end, time]);
         if let Some((normal, distance)) =
             walls.plane_on_way([self.wall, self.part], at, filter, way)
@@ -264,7 +284,7 @@ impl<S: Scalar> WallContact<S> {
         at: &Row<S>,
         velocity: &Row<S>,
     ) -> Option<Bounce<S>> {
-        let bounces = self.numbers.restitution > S::zero();
+        let bounces = self.numbers.restitution > S::zero() && self.share() > S::zero();
         bounces.then(|| self.approach(params, at, velocity)).flatten()
     }
 
@@ -304,14 +324,21 @@ impl<S: Scalar> WallContact<S> {
     ) -> Option<Bounce<S>> {
         let bounce = self.bounce(params, at, velocity)?;
         let Bounce { separation, approach_speed, impact_speed } = bounce;
+        let normal = (approach_speed + impact_speed * self.numbers.restitution)
+            / (velocity[3] * self.share());
+        let mut left = normal;
+        if !self.numbers.locked_axes.moves_freely() {
+            // Along a lock it changes the slip too: both at once would add energy.
+            self.apply_impulse(velocity, spin, ContactImpulse { normal, ..ContactImpulse::zero() });
+            left = S::zero();
+        }
         let relative = xyz(velocity) - self.surface;
         let stopping = self.slip(relative, spin) * (-self.tangent_mass() / velocity[3]);
-        let impulse = FrictionCone::new(self.numbers.friction).clamp(ContactImpulse {
-            normal: (approach_speed + impact_speed * self.numbers.restitution) / velocity[3],
-            tangent: stopping * (S::one() + self.numbers.tangential_restitution),
-        });
-        set(at, xyz(at) - self.normal * separation);
-        self.apply_impulse(velocity, spin, impulse);
+        let tangent = stopping * (S::one() + self.numbers.tangential_restitution);
+        let impulse = FrictionCone::new(self.numbers.friction);
+        let impulse = impulse.clamp(ContactImpulse { normal, tangent });
+        set(at, xyz(at) + self.way_nearer(separation));
+        self.apply_impulse(velocity, spin, ContactImpulse { normal: left, ..impulse });
         Some(bounce)
     }
 
@@ -340,7 +367,7 @@ impl<S: Scalar> WallContact<S> {
             None => (-separation.max(S::zero()) / time, None),
         };
         let wanted = ContactImpulse {
-            normal: mass * (target - relative.dot(self.normal)),
+            normal: mass * (target - relative.dot(self.normal)) / self.share(),
             tangent: self.slip(relative, spin) * (-mass * self.tangent_mass()),
         };
         let change = self.impulse.solve(wanted, softness, &self.cone());
@@ -360,11 +387,12 @@ impl<S: Scalar> WallContact<S> {
     }
 
     fn apply_impulse(&self, velocity: &mut Row<S>, spin: &mut Row<S>, impulse: ContactImpulse<S>) {
+        let WallNumbers { inertia_factor, locked_axes, .. } = self.numbers;
         let inverse_mass = velocity[3];
-        set(velocity, xyz(velocity) + impulse.along(self.normal) * inverse_mass);
-        let turn =
-            self.normal.cross(impulse.tangent) * (self.numbers.inertia_factor * inverse_mass);
-        set(spin, xyz(spin) - turn);
+        let change = impulse.along(self.normal) * inverse_mass;
+        set(velocity, xyz(velocity) + locked_axes.free_translation(change));
+        let turn = self.normal.cross(impulse.tangent) * (inertia_factor * inverse_mass);
+        set(spin, xyz(spin) - locked_axes.free_rotation(turn));
     }
 
     /// Effective mass of the touched point along the wall, over the mass of the ball.
@@ -384,6 +412,6 @@ impl<S: Scalar> WallContact<S> {
         let load = self.impulse.normal;
         let limits = [rolling_resistance * load, spinning_resistance * load];
         let change = solve_rolling(&mut self.torque, xyz(spin) / -give, self.normal, limits);
-        set(spin, xyz(spin) + change * give);
+        set(spin, xyz(spin) + self.numbers.locked_axes.free_rotation(change * give));
     }
 }

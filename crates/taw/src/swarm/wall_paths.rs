@@ -8,12 +8,13 @@ use super::surfaces::SurfaceOf;
 use super::walls::{StaticGeometry, center};
 use crate::broad::CollisionFilter;
 use crate::math::{Row, Scalar, Vec3};
+use crate::motion::LockedAxes;
 
 /// Visits the walls that a ball meets on its path, and along those that it met. A path of at most
 /// `shortest` metres is not tested for hits. Returns the ball where it ends.
 pub(super) fn along_path<S: Scalar>(
     walls: &dyn StaticGeometry<S>,
-    (ball, filter): (&Row<S>, CollisionFilter),
+    (ball, (filter, locks)): (&Row<S>, (CollisionFilter, LockedAxes)),
     mut displacement: Vec3<S>,
     shortest: S,
     visit: &mut impl FnMut(&Row<S>, [u32; 2], Vec3<S>, S),
@@ -36,7 +37,8 @@ pub(super) fn along_path<S: Scalar>(
         }
         let time = ((distance - ball[3]) / approach).clamp(S::zero(), S::one());
         ball = moved(&ball, displacement * time);
-        displacement = (displacement + normal * approach) * (S::one() - time);
+        let bend = locks.free_normal(normal);
+        displacement = (displacement - bend * displacement.dot(bend)) * (S::one() - time);
     }
     ball
 }
@@ -50,12 +52,12 @@ fn moved<S: Scalar>(ball: &Row<S>, by: Vec3<S>) -> Row<S> {
 pub(super) fn slide_along_wall<S: Scalar>(
     walls: &dyn StaticGeometry<S>,
     at: &mut Row<S>,
-    filter: CollisionFilter,
+    of_ball: (CollisionFilter, LockedAxes),
     displacement: Vec3<S>,
 ) -> S {
     let (start, mut hits) = (moved(at, -displacement), false);
-    let end =
-        along_path(walls, (&start, filter), displacement, S::zero(), &mut |_, _, _, _| hits = true);
+    let ball = (&start, of_ball);
+    let end = along_path(walls, ball, displacement, S::zero(), &mut |_, _, _, _| hits = true);
     if !hits {
         return S::zero();
     }
@@ -100,7 +102,8 @@ impl<S: Scalar> WallQuery<'_, S> {
         match self.tier {
             Tier::Lab => [Vec3::new(at[0] - u, at[1] - v, at[2] - w); 2],
             Tier::Full => {
-                self.times.map(|time| Vec3::new(u, v, w) * time + self.gravity * (time * time))
+                let gravity = self.surfaces.locked_axes(row).free_translation(self.gravity);
+                self.times.map(|time| Vec3::new(u, v, w) * time + gravity * (time * time))
             }
         }
     }
@@ -123,7 +126,7 @@ impl<S: Scalar> WallQuery<'_, S> {
     pub fn visit_way(
         &self,
         walls: &dyn StaticGeometry<S>,
-        (ball, filter): (&Row<S>, CollisionFilter),
+        (ball, (filter, locks)): (&Row<S>, (CollisionFilter, LockedAxes)),
         displacement: Vec3<S>,
         visit: &mut impl FnMut(&Row<S>, [u32; 2], Vec3<S>, S),
     ) {
@@ -134,7 +137,7 @@ impl<S: Scalar> WallQuery<'_, S> {
             }
         }
         let shortest = S::from_f64(FAST) * ball[3];
-        along_path(walls, (ball, filter), displacement, shortest, visit);
+        along_path(walls, (ball, (filter, locks)), displacement, shortest, visit);
     }
 
     /// Returns true if a wall may pass a ball within the step.

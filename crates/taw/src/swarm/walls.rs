@@ -291,7 +291,8 @@ impl<S: Scalar> Chunk<S> {
             let mut reach = query.skin_left[*row as usize].max(S::zero());
             if let Some(displacement) = displacement {
                 reach = query.reach(ball[3], displacement);
-                query.visit_way(walls, (ball, filter), displacement, &mut visit);
+                let of_ball = (filter, query.surfaces.locked_axes(*row));
+                query.visit_way(walls, (ball, of_ball), displacement, &mut visit);
             }
             walls.shapes_at(ball, filter, reach, &mut |part, normal, distance| {
                 visit(ball, part, normal, distance);

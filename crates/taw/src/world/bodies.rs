@@ -5,7 +5,7 @@ use cgmath::{InnerSpace, Zero};
 use super::World;
 use super::body_contacts::BodyCandidate;
 use crate::Error;
-use crate::body::{BodyContact, BodyState, BodySystem, Partner};
+use crate::body::{BodyContact, BodyPartner, BodyState, BodySystem};
 use crate::math::{Scalar, UnionFind, Vec3, cast_vector};
 use crate::motion::rest;
 
@@ -85,9 +85,9 @@ impl<S: Scalar> World<S> {
         let slept = |contact: &BodyContact| {
             sleeps(contact.key.body)
                 && match contact.key.partner {
-                    Partner::Body(other) => sleeps(other),
-                    Partner::Ball(_) => false,
-                    Partner::Wall(wall) => self.walls.row(wall).is_ok(),
+                    BodyPartner::Body(other) => sleeps(other),
+                    BodyPartner::Ball(_) => false,
+                    BodyPartner::Wall(wall) => self.walls.row(wall).is_ok(),
                 }
         };
         let kept: Vec<_> = before.into_iter().filter(slept).collect();
@@ -155,7 +155,7 @@ impl<S: Scalar> World<S> {
         let (states, islands) = (&self.bodies.states, &mut self.scratch.bodies.islands);
         islands.reset(states.len());
         for contact in self.bodies.contacts.iter().filter(|contact| contact.presses()) {
-            let Partner::Body(other) = contact.key.partner else { continue };
+            let BodyPartner::Body(other) = contact.key.partner else { continue };
             let (Ok(a), Ok(b)) = (self.bodies.row(other), self.bodies.row(contact.key.body)) else {
                 continue;
             };

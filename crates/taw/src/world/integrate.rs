@@ -25,7 +25,9 @@ impl<S: Scalar> StepContext<'_, S> {
         }
         let scale = marbles.own.gravity_scale.get(row).unwrap_or(S::one());
         let own = marbles.own.force.get(row).unwrap_or_else(Vec3::zero) / mass;
-        self.gravity * scale + own + acceleration_in_step(self.forces, motion, mass, self.dt)
+        let sum =
+            self.gravity * scale + own + acceleration_in_step(self.forces, motion, mass, self.dt);
+        marbles.locked_axes_of_row(row).free_translation(sum)
     }
 }
 
@@ -58,6 +60,7 @@ impl<S: Scalar> Marbles<S> {
         let only_gravity = context.forces.is_empty()
             && self.own.gravity_scale.is_empty()
             && self.own.mass.is_empty()
+            && self.own.locked_axes.is_empty()
             && self.own.force.is_empty();
         let same_for_all = self.own.integrator.is_empty() && self.own.damping.is_empty();
         if only_gravity && same_for_all {

@@ -155,6 +155,7 @@ impl<S: Scalar> World<S> {
         let mass = marbles.mass(row);
         body.owner = JointOwner::Ball(self.scratch.soft_step.slot_of_marble[row]);
         body.inverse_mass = if mass.is_infinite() { 0.0 } else { inverse_mass(mass).as_f64() };
+        body.locked_axes = marbles.locked_axes_of_row(row);
         let turns = marbles.rotation_of(row, self.settings.model.rotation) == Rotation::Dynamic;
         let radius = marbles.radius[row].as_f64();
         body.radius = radius;

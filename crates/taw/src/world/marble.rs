@@ -6,7 +6,7 @@ use crate::Error;
 use crate::broad::CollisionLayers;
 use crate::error::within;
 use crate::math::{Point3, Quat, Scalar, Vec3};
-use crate::motion::{Integrator, Mass, Rotation};
+use crate::motion::{Integrator, LockedAxes, Mass, Rotation};
 use crate::response::Material;
 
 /// Description of a marble (a rigid sphere or capsule) as a value.
@@ -31,6 +31,8 @@ pub struct Marble<S> {
     /// Angular velocity in rad/s, an axial vector in world space. Stored only by a model with
     /// rotation.
     pub angular_velocity: Vec3<S>,
+    /// Axes that it neither moves along nor turns about.
+    pub locked_axes: LockedAxes,
     /// Own integrator instead of the model's.
     pub integrator: Option<Integrator>,
     /// Own rotation model, limited by the world's: a marble may roll visually, or not rotate at
@@ -58,6 +60,7 @@ impl<S: Scalar> Marble<S> {
             mass: Mass::default(),
             gravity_scale: S::one(),
             damping: Damping::default(),
+            locked_axes: LockedAxes::NONE,
             integrator: None,
             rotation_model: None,
             material: None,

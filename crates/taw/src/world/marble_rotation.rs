@@ -5,12 +5,15 @@ use cgmath::{InnerSpace, One, Zero};
 use super::continuous::Turn;
 use super::marbles::Marbles;
 use crate::math::{Quat, Scalar, Vec3, cast_vector, is_finite};
-use crate::motion::{Rotation, integrate_rotation};
+use crate::motion::{LockedAxes, Rotation, integrate_rotation};
 use crate::shape::capsule_unit_inertia;
 
 impl<S: Scalar> Marbles<S> {
     /// Rotation model of a marble in a world of this model.
     pub(super) fn rotation_of(&self, row: usize, world: Rotation) -> Rotation {
+        if self.locked_axes_of_row(row).contains(LockedAxes::ROTATION) {
+            return Rotation::None;
+        }
         self.own.rotation_model.get(row).map_or(world, |own| own.min(world))
     }
 
@@ -19,9 +22,9 @@ impl<S: Scalar> Marbles<S> {
         self.rotation_of(row, Rotation::Dynamic) != Rotation::Dynamic
     }
 
-    /// Returns true if any marble has its own rotation model.
+    /// Returns true if any marble has its own rotation model or locked axes.
     pub(super) fn has_rotation_locks(&self) -> bool {
-        !self.own.rotation_model.is_empty()
+        !(self.own.rotation_model.is_empty() && self.own.locked_axes.is_empty())
     }
 
     /// Adds or drops the columns for rotation. New ones start with no rotation, at rest.
@@ -37,13 +40,14 @@ impl<S: Scalar> Marbles<S> {
     /// Sets the angular velocity of rolling without slip over a surface at rest with this normal.
     pub(super) fn roll_without_slip(&mut self, row: usize, normal: Vec3<S>) {
         let angular_velocity = normal.cross(self.velocity[row]) / self.radius[row];
+        let locks = self.locked_axes_of_row(row);
         if self.own.half_length.get(row).is_some() {
             return; // it does not roll whichever way it goes
         }
         if let Some(slot) = self.angular_velocity.get_mut(row)
             && is_finite(angular_velocity)
         {
-            *slot = angular_velocity;
+            *slot = locks.free_rotation(angular_velocity);
         }
     }
 
@@ -92,6 +96,7 @@ impl<S: Scalar> Marbles<S> {
             if let Some(damping) = self.own.damping.get(row) {
                 angular_velocity *= (-damping.angular * dt).exp_portable();
             }
+            let angular_velocity = self.free_spin(row, angular_velocity);
             if is_finite(angular_velocity) && angular_velocity != self.angular_velocity[row] {
                 self.angular_velocity[row] = angular_velocity;
                 self.mark_changed(row);
@@ -111,7 +116,8 @@ impl<S: Scalar> Marbles<S> {
                 }
                 let Turn { free, carried } = turns.get(row).copied().unwrap_or_default();
                 self.integrate_free_rotation(row, dt * free, rotation);
-                if carried != Quat::one() {
+                let turns = self.locked_axes_of_row(row).turns_freely();
+                if carried != Quat::one() && turns {
                     self.carry_rotation(row, carried);
                 }
             }
@@ -127,7 +133,13 @@ impl<S: Scalar> Marbles<S> {
 
     /// Integrates the rotation of a marble among capsules.
     fn integrate_free_rotation(&mut self, row: usize, dt: S, model: Rotation) {
-        if self.is_dynamic(row, model) || self.half_length(row) == S::zero() {
+        let locks = self.locked_axes_of_row(row);
+        let is_ball = self.half_length(row) == S::zero();
+        if !locks.turns_freely() && !is_ball && self.is_dynamic(row, model) {
+            if !self.angular_velocity[row].is_zero() {
+                self.rotate_locked_capsule(row, locks, dt.as_f64());
+            }
+        } else if self.is_dynamic(row, model) || is_ball {
             self.integrate_symmetric_top(row, dt);
         } else {
             let axis = self.rotation[row] * Vec3::unit_y();
@@ -152,6 +164,9 @@ impl<S: Scalar> Marbles<S> {
     pub(super) fn axis_velocity(&self, row: usize, model: Rotation) -> Vec3<S> {
         if !self.is_dynamic(row, model) || self.angular_velocity[row].is_zero() {
             return Vec3::zero();
+        }
+        if !self.locked_axes_of_row(row).turns_freely() {
+            return self.angular_velocity[row];
         }
         cast_vector(self.precession(row, cast_vector(self.axis(row))))
     }

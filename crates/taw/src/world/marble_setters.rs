@@ -9,7 +9,7 @@ use crate::Error;
 use crate::broad::CollisionLayers;
 use crate::error::{finite, finite_point, finite_vector, positive};
 use crate::math::{Point3, Quat, Scalar, Vec3};
-use crate::motion::{Integrator, Mass, Rotation};
+use crate::motion::{Integrator, LockedAxes, Mass, Rotation};
 use crate::response::Material;
 
 impl<S: Scalar> Marbles<S> {
@@ -141,6 +141,18 @@ impl<S: Scalar> Marbles<S> {
         let damping = non_default(damping.validated()?, Damping::default());
         self.own.damping.set(row, damping, self.len());
         self.disturb(row);
+        Ok(())
+    }
+
+    /// Locks axes that a marble neither moves along nor turns about, and frees all others. Its velocity
+    /// along locked ones is set to zero in the next step.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`].
+    pub fn set_locked_axes(&mut self, id: MarbleId, axes: LockedAxes) -> Result<(), Error> {
+        let row = self.row(id)?;
+        self.own.locked_axes.set(row, non_default(axes, LockedAxes::NONE), self.len());
+        self.mark_changed(row);
         Ok(())
     }
 

@@ -83,7 +83,8 @@ impl<S: Scalar> Marbles<S> {
             let turns = self.rotation_of(row, model) == Rotation::Dynamic;
             let moments = capsule_unit_inertia(self.radius[row], half);
             let whirl = moments.map(|moment| if turns { moment.recip() } else { S::zero() });
-            CapsuleInertia { axis, half_length: half, inverse_unit_inertia: whirl }
+            let locked_axes = self.locked_axes_of_row(row);
+            CapsuleInertia { axis, half_length: half, inverse_unit_inertia: whirl, locked_axes }
         }));
     }
 

@@ -16,7 +16,7 @@ use crate::error::{finite, finite_point, finite_vector, positive};
 use crate::frame::Bivector;
 use crate::handle::{Handles, MarbleId};
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite, is_finite_point};
-use crate::motion::{Integrator, Mass, Motion, Rotation};
+use crate::motion::{Integrator, LockedAxes, Mass, Motion, Rotation};
 use crate::response::{CapsuleInertia, Material, SolverBodies};
 use crate::swarm::BodyColumns;
 use crate::uncompared::Uncompared;
@@ -53,6 +53,8 @@ sparse_columns! {
         integrator: Integrator,
         rotation_model: Rotation,
         material: Material<S>,
+        /// Locked axes other than none.
+        locked_axes: LockedAxes,
         /// Layers other than all.
         layers: CollisionLayers,
         /// Marbles that never sleep.
@@ -136,6 +138,7 @@ impl<S: Scalar> Marbles<S> {
             integrator: marble.integrator,
             rotation_model: marble.rotation_model,
             material,
+            locked_axes: non_default(marble.locked_axes, LockedAxes::NONE),
             layers: non_default(marble.layers, CollisionLayers::ALL),
             sleeping_disabled: marble.sleeping_disabled.then_some(()),
         };
@@ -201,6 +204,7 @@ impl<S: Scalar> Marbles<S> {
             integrator: self.own.integrator.get(row),
             rotation_model: self.own.rotation_model.get(row),
             material: self.own.material.get(row),
+            locked_axes: self.locked_axes_of_row(row),
             layers: self.layers_of_row(row),
             sleeping_disabled: self.own.sleeping_disabled.get(row).is_some(),
         })
@@ -230,6 +234,7 @@ impl<S: Scalar> Marbles<S> {
             integrator: marble.integrator,
             rotation_model: marble.rotation_model,
             material: marble.material.map(Material::cast),
+            locked_axes: marble.locked_axes,
             layers: marble.layers,
             sleeping_disabled: marble.sleeping_disabled,
         })
@@ -329,6 +334,9 @@ impl<S: Scalar> Marbles<S> {
         rim: Vec3<S>,
     ) {
         let Ok(row) = self.row(id) else { return };
+        let locks = self.locked_axes_of_row(row);
+        let [way, faster] = [way, faster].map(|change| locks.free_translation(change));
+        let rim = locks.free_rotation(rim);
         if [way, faster, rim] != [Vec3::zero(); 3] {
             self.disturb(row);
         }
@@ -349,6 +357,7 @@ impl<S: Scalar> Marbles<S> {
         &'a mut self,
         inverse_mass: &'a [S],
         held: &'a [bool],
+        locked_axes: &'a [LockedAxes],
         rods: &'a [CapsuleInertia<S>],
     ) -> (SolverBodies<'a, S>, &'a SparseColumn<Integrator>) {
         let columns = SolverBodies {
@@ -359,6 +368,7 @@ impl<S: Scalar> Marbles<S> {
             inverse_mass,
             spin: &mut self.angular_velocity,
             rotation_locked: held,
+            locked_axes,
             capsules: rods,
         };
         (columns, &self.own.integrator)
@@ -368,6 +378,7 @@ impl<S: Scalar> Marbles<S> {
     pub(super) fn accelerate_differently(&self) -> bool {
         self.has_external_forces()
             || !self.own.gravity_scale.is_empty()
+            || !self.own.locked_axes.is_empty()
             || self.own.mass.values().any(|mass| mass == Mass::Infinite)
     }
 

@@ -21,6 +21,7 @@ mod integrate;
 mod joints;
 mod lasting_contacts;
 mod limits;
+mod locked_axes;
 mod marble;
 mod marble_rotation;
 mod marble_setters;

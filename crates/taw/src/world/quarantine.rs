@@ -86,6 +86,7 @@ impl<S: Scalar> World<S> {
         self.check_period(self.marbles.period)?;
         self.check_joints()?;
         self.check_bodies()?;
+        self.check_locked_axes()?;
         self.check_rows()?;
         match self.marbles.first_capsule() {
             Some(id) if !self.settings.model.response.knows_capsules() => {

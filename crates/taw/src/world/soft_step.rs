@@ -263,10 +263,17 @@ impl<S: Scalar> World<S> {
     }
 
     /// Marbles by which the next [step](Self::step) would be refused, each with the reason: of
-    /// [`Response::SoftStep`](crate::response::Response::SoftStep), those that were set to numbers that do not fit into its rows.
+    /// [`Response::SoftStep`](crate::response::Response::SoftStep), those that were set to numbers that do not fit into its rows;
+    /// of [`EventDriven`](crate::response::Response::EventDriven), those with
+    /// [locked axes](crate::motion::LockedAxes).
     pub fn unsupported_marbles(&self) -> Vec<(MarbleId, Error)> {
         if !self.settings.model.response.uses_swarm_rows() {
-            return Vec::new();
+            let locked = |row: usize| {
+                Some((self.marbles.id(row)?, self.check_locked_axes_of_row(row).err()?))
+            };
+            let any = !self.marbles.own.locked_axes.is_empty();
+            let rows = if any { 0..self.marbles.len() } else { 0..0 };
+            return rows.filter_map(locked).collect();
         }
         let find = |row: usize| Some((self.marbles.id(row)?, self.check_row(row).err()?));
         if self.changes_are_listed() {
@@ -357,9 +364,11 @@ impl<S: Scalar> World<S> {
             };
             let material = marbles.own.material.get(row);
             let rotation_locked = marbles.rotation_of(row, rotation) != Rotation::Dynamic;
-            let surface = (material.is_some() || rotation_locked || !plain_swarm).then(|| {
+            let locked_axes = marbles.locked_axes_of_row(row);
+            let is_plain = plain_swarm && !rotation_locked && locked_axes.is_empty();
+            let surface = (material.is_some() || !is_plain).then(|| {
                 let material = material.unwrap_or_default();
-                BallSurface { material, rotation_locked }
+                BallSurface { material, rotation_locked, locked_axes }
             });
             let spin = marbles.angular_velocity.get(row).copied().filter(|_| !rotation_locked);
             let marble = MarbleRow {

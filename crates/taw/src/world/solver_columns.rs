@@ -6,7 +6,7 @@ use super::marbles::Marbles;
 use super::model::Model;
 use super::walls::Walls;
 use crate::math::{Scalar, Vec3, length};
-use crate::motion::Rotation;
+use crate::motion::{LockedAxes, Rotation};
 use crate::response::impulse::{Context, SolverSettings, SubstepStart};
 use crate::response::{CapsuleInertia, SolverBodies};
 
@@ -20,6 +20,8 @@ pub(super) struct MarbleColumns<S> {
     pub velocity_before: Vec<Vec3<S>>,
     /// Rows whose rotation is locked; empty if there are none.
     held: Vec<bool>,
+    /// Locked axes of each row; empty if there are none.
+    locked_axes: Vec<LockedAxes>,
     /// Axes and inertia of capsules; empty if there are none.
     capsules: Vec<CapsuleInertia<S>>,
 }
@@ -36,6 +38,11 @@ impl<S: Scalar> MarbleColumns<S> {
         if model.rotation == Rotation::Dynamic && marbles.has_rotation_locks() {
             self.held.extend((0..marbles.len()).map(|row| marbles.is_rotation_locked(row)));
         }
+        self.locked_axes.clear();
+        if !marbles.own.locked_axes.is_empty() {
+            let rows = 0..marbles.len();
+            self.locked_axes.extend(rows.map(|row| marbles.locked_axes_of_row(row)));
+        }
         marbles.rods(model.rotation, &mut self.capsules);
     }
 
@@ -46,7 +53,7 @@ impl<S: Scalar> MarbleColumns<S> {
         model: Model,
     ) -> (SolverBodies<'a, S>, impl Fn(usize) -> S + use<'a, S>) {
         let (mut bodies, integrator) =
-            marbles.columns(&self.inverse_mass, &self.held, &self.capsules);
+            marbles.columns(&self.inverse_mass, &self.held, &self.locked_axes, &self.capsules);
         if model.rotation != Rotation::Dynamic {
             bodies.spin = &mut []; // cosmetic rotation does not affect contacts
         }

@@ -19,7 +19,7 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`; [`Error::OutOfRange`] if it, or a substep of it, is not in
     /// [`World::TIMES`]; [`Error::UnsupportedShape`] for a capsule in a world that is event-driven,
     /// periodic, or steps by `SoftStep`; [`Error::Unsupported`] for [joints](Self::joints) by another
-    /// response; [`Error::OutOfRange`] for a marble too large for its
+    /// response, and for [locked axes](crate::motion::LockedAxes) by `EventDriven`; [`Error::OutOfRange`] for a marble too large for its
     /// [period](Self::set_period), and by `SoftStep` for one that was set to a radius of less than
     /// 1e-9 m, or to a position, velocity or surface speed of over 1e12 m or m/s;
     /// [`Error::TooManyPairs`] if more than [`World::MAX_PAIRS`] overlap, as from some 16,400 marbles
@@ -58,6 +58,8 @@ impl<S: Scalar> World<S> {
     fn integrate_checked(&mut self, dt: S) -> Result<(), Error> {
         self.decide_one_way(dt);
         self.find_ignored_rows();
+        let held = self.marbles.held();
+        self.marbles.hold(&held); // somebody may have set velocities
         self.sensors.begin_substep(&self.marbles);
         self.audit_before();
         self.wake_changed();
@@ -71,7 +73,9 @@ impl<S: Scalar> World<S> {
             self.scratch.reach = method.contact_distance(self, dt);
             return Ok(());
         }
-        method.integrate(self, dt)
+        method.integrate(self, dt)?;
+        self.marbles.hold(&held);
+        Ok(())
     }
 
     /// Integrates marbles by a method: velocities, positions, rotations.
@@ -155,6 +159,8 @@ impl<S: Scalar> World<S> {
 
     /// Solves the listed contacts by a method.
     pub(super) fn solve_listed_contacts(&mut self, method: &(impl Method<S> + ?Sized), dt: S) {
+        let held = self.marbles.held();
+        self.marbles.hold(&held); // somebody may have set velocities
         self.walls.update_tree(); // some may have been taken out since contacts were looked for
         self.drop_missing_contacts();
         self.release_separated_stops();
@@ -163,7 +169,9 @@ impl<S: Scalar> World<S> {
         self.follow_contacts();
         self.scratch.columns.read(&mut self.marbles, self.settings.model);
         method.solve(self, dt);
+        self.marbles.hold(&held);
         self.stop_bounces_at_walls();
+        self.marbles.hold(&held);
         self.quarantine_non_finite();
         self.roll_what_only_shows();
         self.settings.limits.apply(&mut self.marbles);

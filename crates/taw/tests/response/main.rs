@@ -11,6 +11,7 @@ mod energy_audit;
 mod impulse;
 mod islands;
 mod jammed;
+mod locked_axes;
 mod parting;
 mod penalty;
 mod rotation;

@@ -95,17 +95,21 @@ type Change = fn(&mut World<f32>, WallId, MarbleId);
 #[test]
 fn whatever_changes_about_a_marble_wakes_its_island() {
     let (world, floor, ids) = sleeping();
-    let changes: [(&str, Change); 6] = [
+    let changes: [(&str, Change); 7] = [
         ("impulse", |w, _, id| w.marbles.apply_impulse(id, Vec3::new(0.0, 5.0, 0.0)).unwrap()),
         ("velocity", |w, _, id| w.marbles.set_velocity(id, Vec3::new(0.0, 1.0, 0.0)).unwrap()),
         ("force", |w, _, id| w.marbles.apply_force(id, Vec3::new(0.0, 1e3, 0.0)).unwrap()),
         ("mass", |w, _, id| w.marbles.set_mass(id, Mass::Kilograms(1.0)).unwrap()),
         ("gravity scale", |w, _, id| w.marbles.set_gravity_scale(id, -1.0).unwrap()),
+        ("locked axes", |w, _, id| w.marbles.set_locked_axes(id, LockedAxes::ROTATION_X).unwrap()),
         ("sleeping disabled", |w, _, id| w.marbles.set_sleeping_disabled(id, true).unwrap()),
     ];
     for id in &ids {
         let island = island(&world, *id);
         for (name, change) in changes {
+            if name == "locked axes" && !RESPONSE.get().knows_locked_axes() {
+                continue; // it is refused
+            }
             let mut world = world.clone();
             change(&mut world, floor, *id);
             let version = world.sleep_version();

@@ -12,6 +12,7 @@ use super::impulse::{BodyA, CachedImpulse, Context, SolverSettings};
 use super::{Colliders, ContactKey, KeyedByContact, SolverBodies};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Scalar, UnionFind, Vec3, is_finite, is_finite_point};
+use crate::motion::MAX_ESCAPE;
 
 /// Scratch buffers, kept for their memory.
 #[derive(Clone, Debug, Default)]
@@ -60,6 +61,9 @@ struct ApproachConstraint<S> {
     /// Lower bound of the separation speed, in m/s: zero, or negative where a separation is still
     /// open.
     min_separation_speed: S,
+    /// Fraction of a change of the separation speed that both bodies take along the normal: half each, or
+    /// all of it at a wall; more where locks take a part.
+    fraction: S,
     /// Change of the separation speed accumulated in this substep, in m/s.
     velocity_change: S,
 }
@@ -133,7 +137,7 @@ fn warm_start<S: Scalar>(
         let Ok(at) = cache.binary_search_by_key(&c.key, CachedImpulse::key) else { continue };
         c.velocity_change = cache[at].normal_impulse();
         let (weighted_change, separation_speed) =
-            (c.velocity_change * c.fraction_b(), marbles.separation_speed(c));
+            (c.velocity_change * c.fraction, marbles.separation_speed(c));
         let warm_start = &mut warm_starts[c.island as usize];
         warm_start.requested += weighted_change * (c.min_separation_speed - separation_speed);
         warm_start.achieved -= weighted_change * separation_speed;
@@ -143,7 +147,7 @@ fn warm_start<S: Scalar>(
     }
     for c in constraints.iter() {
         warm_starts[c.island as usize].achieved +=
-            c.velocity_change * c.fraction_b() * marbles.separation_speed(c);
+            c.velocity_change * c.fraction * marbles.separation_speed(c);
     }
     for c in constraints.iter_mut() {
         let fraction = warm_starts[c.island as usize].fraction();
@@ -211,6 +215,11 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
         let b = contact.b as usize;
         let normal = self.impact_normal(a, b, (normal, separation), context);
+        let share = |row: usize| self.locked_axes(row).share(normal);
+        let shares = share(b) + a.marble().map_or_else(S::zero, share);
+        if shares == S::zero() {
+            return None; // locks bear it
+        }
         let surface_speed = self.surface_velocity(a, b, (arms, normal), context.walls).dot(normal);
         let zero = S::zero();
         let mut c = ApproachConstraint {
@@ -221,6 +230,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             axis_offset,
             normal,
             surface_speed,
+            fraction: shares.recip(),
             min_separation_speed: zero,
             velocity_change: zero,
         };
@@ -260,15 +270,11 @@ impl<S: Scalar> SolverBodies<'_, S> {
 
     /// Changes the separation speed of a contact.
     fn apply_velocity_change(&mut self, c: &ApproachConstraint<S>, velocity_change: S) {
-        let velocity_change = c.normal * velocity_change;
-        match c.a {
-            BodyA::Wall(..) => self.velocity[c.b] += velocity_change,
-            BodyA::Marble(a) => {
-                let half = velocity_change * S::from_f64(0.5);
-                self.velocity[a as usize] -= half;
-                self.velocity[c.b] += half;
-            }
+        let change = c.normal * velocity_change * c.fraction;
+        if let Some(a) = c.a.marble() {
+            self.velocity[a] -= self.locked_axes(a).free_translation(change);
         }
+        self.velocity[c.b] += self.locked_axes(c.b).free_translation(change);
     }
 
     /// Stops an approach, or takes back a superfluous change. False if the change is below
@@ -317,21 +323,11 @@ impl<S: Scalar> SolverBodies<'_, S> {
         if excess <= S::zero() {
             return false;
         }
-        let displacement = normal * (excess * c.fraction_b());
+        let displacement = normal * (excess * c.fraction.min(S::from_f64(MAX_ESCAPE)));
         for (row, displacement) in [(Some(b), displacement), (a.marble(), -displacement)] {
             let Some(row) = row else { continue };
-            let position = self.position[row] + displacement;
-            if is_finite_point(position) {
-                self.position[row] = position;
-            }
+            self.displace(row, displacement);
         }
         true
-    }
-}
-
-impl<S: Scalar> ApproachConstraint<S> {
-    /// Fraction of a change that the second body takes.
-    fn fraction_b(&self) -> S {
-        if self.a.marble().is_none() { S::one() } else { S::from_f64(0.5) }
     }
 }

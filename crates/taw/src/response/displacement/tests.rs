@@ -37,6 +37,7 @@ fn restituted<S: Scalar>(
         inverse_mass: &[],
         spin: &mut [],
         rotation_locked: &[],
+        locked_axes: &[],
         capsules: &[],
     };
     let zero = S::zero();

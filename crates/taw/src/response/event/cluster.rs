@@ -63,6 +63,7 @@ impl ClusterBodies {
             inverse_mass: &self.inverse_mass,
             spin: &mut self.spin,
             rotation_locked: &self.rotation_locked,
+            locked_axes: &[],
             capsules: &[],
         }
     }

@@ -116,7 +116,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         arms: [Vec3<S>; 2],
         normal: Vec3<S>,
     ) -> InverseEffectiveMass<S> {
-        if self.capsules.is_empty() {
+        if self.capsules.is_empty() && self.locked_axes.is_empty() {
             let first = a.marble().map_or((S::zero(), BallRotation::Locked), |a| {
                 (self.inverse_mass[a], self.ball_rotation(a))
             });

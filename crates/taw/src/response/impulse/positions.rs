@@ -1,7 +1,7 @@
 //! Position update and position correction, after velocities are solved.
 
 use super::{Colliders, Constraint, Context};
-use crate::math::{Point3, Scalar, Vec3, is_finite_point, length};
+use crate::math::{Point3, Scalar, Vec3, length};
 use crate::response::SolverBodies;
 
 /// Iterations of the position solver over penetrating contacts.
@@ -19,7 +19,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let follow_time = |row: usize| context.follow_time_of(row);
         for (row, initial_velocity) in initial_velocity.iter().enumerate() {
             let change = self.velocity[row] - initial_velocity;
-            self.set_position(row, self.position[row] + context.displacement_of(row, change));
+            self.displace(row, context.displacement_of(row, change));
         }
         for c in constraints {
             let Some(time_since_impact) = c.time_since_impact else { continue };
@@ -28,10 +28,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
                 let Some(row) = row else { continue };
                 let change = impulse * self.inverse_mass[row];
                 if !context.is_ccd_stopped(row) {
-                    self.set_position(
-                        row,
-                        self.position[row] + change * (time_since_impact - follow_time(row)),
-                    );
+                    self.displace(row, change * (time_since_impact - follow_time(row)));
                 }
             }
         }
@@ -87,7 +84,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
             self.normal_and_separation(self.position, c.a, c.b, c.axis_offset, context.walls);
         let Some((normal, separation)) = contact else { return };
         if separation < kept && self.inverse_mass[c.b] > S::zero() {
-            self.set_position(c.b, self.position[c.b] + normal * (kept - separation));
+            let out = self.locked_axes(c.b).escape(normal);
+            self.displace(c.b, out * (kept - separation));
         }
     }
 
@@ -121,7 +119,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let moves = [(Some(c.b), pseudo_impulse), (c.a.marble(), -pseudo_impulse)]
             .map(|(row, impulse)| row.map(|row| (row, impulse * self.inverse_mass[row])));
         let mut part = S::one();
-        if c.a.marble().is_some() {
+        // Along free axes, a wall at a small angle pushes far.
+        if c.a.marble().is_some() || !self.locked_axes(c.b).moves_freely() {
             for (row, displacement) in moves.into_iter().flatten() {
                 let distance = length(displacement);
                 let left = self.radius[row] * context.settings.max_relative_push
@@ -133,13 +132,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             }
         }
         for (row, displacement) in moves.into_iter().flatten() {
-            self.set_position(row, self.position[row] + displacement * part);
-        }
-    }
-
-    fn set_position(&mut self, row: usize, position: Point3<S>) {
-        if is_finite_point(position) {
-            self.position[row] = position;
+            self.displace(row, displacement * part);
         }
     }
 }

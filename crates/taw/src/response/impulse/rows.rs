@@ -9,7 +9,7 @@ use super::islands::{DIRECTIONS, Island, Islands};
 use super::{Constraint, RollingConstraint};
 use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::math::{Scalar, Vec3};
-use crate::response::bodies::{BodyMotion, CapsuleInertia, push, relative_velocity};
+use crate::response::bodies::{BodyMotion, CapsuleInertia, push, push_locked, relative_velocity};
 use crate::response::{BallRotation, SolverBodies};
 use crate::workers::{DisjointSlice, parallel_for};
 
@@ -310,12 +310,19 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
     fn push(&mut self, row: usize, change: Vec3<S>, normal: Vec3<S>, arm: &Vec3<S>) {
         let turn =
             self.capsule(row).map(|capsule| capsule.apply_inverse_inertia(arm.cross(change)));
+        let any_locked = !self.columns.locked_axes.is_empty();
+        let locks = any_locked.then(|| self.columns.locked_axes(self.marble(row)));
         let PackedBody { motion, spin_per_speed } = &mut self.bodies[row];
-        if let Some(turn) = turn {
-            motion.velocity += change;
-            motion.spin += turn;
-        } else {
-            push(&mut motion.velocity, &mut motion.spin, change, normal, *spin_per_speed);
+        let (velocity, spin) = (&mut motion.velocity, &mut motion.spin);
+        match (turn, locks) {
+            (Some(turn), locks) => {
+                *velocity += locks.map_or(change, |locks| locks.free_translation(change));
+                *spin += turn;
+            }
+            (None, None) => push(velocity, spin, change, normal, *spin_per_speed),
+            (None, Some(locks)) => {
+                push_locked(velocity, spin, change, normal, (*spin_per_speed, locks));
+            }
         }
     }
 

@@ -32,6 +32,9 @@ pub(super) struct PenaltyContact<S> {
     /// True if continuous detection stopped the marble, and it is half inside of this wall.
     pub core_touches: bool,
     pub has_capsule: bool,
+    /// Set where impulses along the normal change the velocity along the tangents too: of capsules and
+    /// of bodies with locked axes.
+    pub is_coupled: bool,
     /// Sum of the curvatures, in 1/m.
     pub curvature: S,
     pub material: ContactMaterial<S>,
@@ -55,6 +58,8 @@ where
         let (a, b) = (body_a.marble(), contact.b as usize);
         // Displacement since the position of the step's own kick; see this module's docs.
         let moved = |row: usize| self.context.displacement_of(row, marbles.velocity[row]);
+        let is_locked =
+            a.into_iter().chain([b]).any(|row| !marbles.locked_axes(row).moves_freely());
         let has_capsule = a.into_iter().chain([b]).any(|row| marbles.capsule(row).is_some());
         let (penetration, normal, arms) = match a {
             Some(a) if !has_capsule => {
@@ -105,6 +110,7 @@ where
             ],
             core_touches: a.is_none() && self.context.is_ccd_stopped(b) && -separation >= core,
             has_capsule,
+            is_coupled: has_capsule || is_locked,
             curvature: a.map_or_else(S::zero, |a| marbles.radius[a].recip())
                 + marbles.radius[b].recip(),
             material: contact.material.clamped(),

@@ -49,9 +49,9 @@ impl<S: Scalar> ContactLoad<S> {
         ];
         let stiffness = limits.map(|(stiffness, inverse_mass)| stiffness * inverse_mass * dt * dt);
         let damping = half_damping.map(damped_fraction);
-        // Normal and tangential motion of a sphere are independent.
+        // Normal and tangential motion of a free sphere are independent.
         let total = |[normal, tangent]: [S; 2]| {
-            if contact.has_capsule { normal + tangent } else { normal.max(tangent) }
+            if contact.is_coupled { normal + tangent } else { normal.max(tangent) }
         };
         Self { damping: total(damping), stiffness: total(stiffness), count: S::one() }
     }

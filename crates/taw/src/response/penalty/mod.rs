@@ -270,7 +270,7 @@ where
                 };
                 let displacement = self.displacement_since(marbles, row, *initial);
                 if is_finite(displacement) {
-                    marbles.position[row] += displacement;
+                    marbles.displace(row, displacement);
                 }
             }
         }
@@ -304,7 +304,7 @@ where
                 };
                 followed[row] = true;
                 if is_finite(displacement) {
-                    marbles.position[row] += displacement;
+                    marbles.displace(row, displacement);
                 }
             }
         }

@@ -81,7 +81,8 @@ where
             }
             for ContactForce { contact, .. } in forces.iter().filter(|it| it.contact.a.is_none()) {
                 let inward = pushes[contact.b].dot(contact.normal).min(S::zero());
-                pushes[contact.b] -= contact.normal * inward;
+                let out = marbles.locked_axes(contact.b).escape(contact.normal);
+                pushes[contact.b] -= out * inward;
             }
         }
         for (position, push) in marbles.position.iter_mut().zip(&*pushes) {
@@ -106,20 +107,26 @@ where
         let contact = &force.contact;
         let left = force.history.overlap - force.parted(pushes);
         let rows = [contact.a, Some(contact.b)];
-        let inverse_mass = |row: &usize| marbles.inverse_mass[*row];
+        let share = |row: &usize| marbles.locked_axes(*row).share(contact.normal);
+        let inverse_mass = |row: &usize| marbles.inverse_mass[*row] * share(row);
         let sum = rows.iter().flatten().map(inverse_mass).fold(S::zero(), |sum, x| sum + x);
         if left <= S::zero() || sum <= S::zero() {
             return;
         }
         let push = contact.normal * (left * S::from_f64(0.5) / sum);
         let moves = [(contact.a, -push), (Some(contact.b), push)]
-            .map(|(row, push)| row.map(|row| (row, push * marbles.inverse_mass[row])));
+            .map(|(row, push)| row.map(|row| (row, push * marbles.inverse_mass[row])))
+            .map(|push| {
+                push.map(|(row, push)| (row, marbles.locked_axes(row).free_translation(push)))
+            });
         // One fraction for both, which keeps their center of mass.
         let mut fraction = S::one();
         for (row, push) in moves.iter().flatten() {
             let (distance, most) = (length(*push), self.max_push(marbles, *row));
             let free = (most - length(pushes[*row])).max(S::zero());
-            if contact.a.is_some() && free < distance {
+            // Along free axes, a wall at a small angle pushes far.
+            let is_limited = contact.a.is_some() || !marbles.locked_axes(*row).moves_freely();
+            if is_limited && free < distance {
                 fraction = fraction.min(free / distance);
             }
         }

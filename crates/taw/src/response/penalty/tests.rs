@@ -57,6 +57,7 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
             inverse_mass: &[1.0 / mass, 1.0 / mass],
             spin: &mut [],
             rotation_locked: &[],
+            locked_axes: &[],
             capsules: &[],
         };
         let law = ContactLaw::HertzMindlin;

@@ -2,8 +2,10 @@
 //! The constraint itself is in [`crate::constraint`].
 
 use super::backing::borne_by_wall;
+pub(in crate::swarm) use super::columns::SolverColumns;
 use super::impacts::note_impacts;
 use super::meeting::{PairMeeting, meeting};
+use super::numbers::Numbers;
 use super::params::{Pass, SolverParams};
 use super::rolling::RollingInertia;
 use super::{
@@ -11,12 +13,9 @@ use super::{
     normal_and_separation, scatter, tipping,
 };
 use crate::constraint::{ContactImpulse, FrictionCone, Softness};
-use crate::math::{Kernel, LANES, RealVector, Row, Scalar, Simd, SimdLevel, Vec3Wide};
-use crate::motion::BALL_INVERSE_INERTIA;
+use crate::math::{Kernel, LANES, RealVector, Scalar, Simd, SimdLevel, Vec3Wide};
 use crate::response::Impact;
 use crate::swarm::batches::Batch;
-use crate::swarm::surfaces::PairNumbers;
-use crate::workers::DisjointSlice;
 
 /// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
 /// it goes no further than it should.
@@ -28,34 +27,11 @@ const MAX_PUSH: f64 = 0.25;
 /// Mark of a ball that presses another one in this step and that no wall bears: neither flies.
 const TOUCHING: f64 = 0.5;
 
-/// The columns that several threads work on.
-#[derive(Clone, Copy)]
-pub(in crate::swarm) struct SolverColumns<'a, S> {
-    /// Center and radius.
-    pub at: DisjointSlice<'a, Row<S>>,
-    /// Velocity and inverse mass.
-    pub velocity: DisjointSlice<'a, Row<S>>,
-    /// Radius times spin, and nothing.
-    pub spin: DisjointSlice<'a, Row<S>>,
-    /// Remaining skin of each ball, in metres.
-    pub skin_left: DisjointSlice<'a, S>,
-    /// The normal of the wall behind each ball, and the impulse that it bears for those who press
-    /// the ball on it, in N s; empty where all weigh about as much.
-    ///
-    /// A light ball that a heavy one presses on a wall takes a thousandth of its momentum at a
-    /// time, if the wall takes it after that. So the wall takes it at once, as if pair and wall
-    /// were solved together: the ball is moved only by what goes along the wall, and weighs as much
-    /// more along the normal of the pair (the Schur complement of the wall's contact).
-    pub backing: DisjointSlice<'a, Row<S>>,
-    /// Velocity of that wall along its normal, in m/s; empty if all are at rest.
-    pub backing_speed: DisjointSlice<'a, S>,
-}
-
 /// One pass over the pairs for their impulses.
 ///
-/// `BACKED` if it is known who has a wall behind it, `OWN` if pairs have numbers of their own: each
-/// of the four is compiled alone.
-struct Solve<'a, S, const BACKED: bool, const OWN: bool> {
+/// `BACKED` if it is known who has a wall behind it, `OWN` if pairs have numbers of their own, and then
+/// `LOCKED` if some have locked axes: each of the six is compiled alone.
+struct Solve<'a, S, const BACKED: bool, const OWN: bool, const LOCKED: bool> {
     pub pass: Pass<S>,
     pub columns: SolverColumns<'a, S>,
     pub batches: &'a [Batch],
@@ -73,19 +49,30 @@ pub(in crate::swarm) fn solve<S: Scalar>(
     friction: S,
 ) {
     macro_rules! run {
-        ($backed:literal, $own:literal) => {
-            simd_level.run(Solve::<S, $backed, $own> { pass, columns, batches, impulses, friction })
+        ($backed:literal, $own:literal, $locked:literal) => {
+            simd_level.run(Solve::<S, $backed, $own, $locked> {
+                pass,
+                columns,
+                batches,
+                impulses,
+                friction,
+            })
         };
     }
-    match (columns.backed(), !impulses.numbers.is_empty()) {
-        (false, false) => run!(false, false),
-        (false, true) => run!(false, true),
-        (true, false) => run!(true, false),
-        (true, true) => run!(true, true),
+    let is_locked = columns.free_axes.len() > 0;
+    match (columns.backed(), !impulses.numbers.is_empty(), is_locked) {
+        (false, false, _) => run!(false, false, false),
+        (false, true, false) => run!(false, true, false),
+        (false, true, true) => run!(false, true, true),
+        (true, false, _) => run!(true, false, false),
+        (true, true, false) => run!(true, true, false),
+        (true, true, true) => run!(true, true, true),
     }
 }
 
-impl<S: Scalar, const BACKED: bool, const OWN: bool> Kernel<S> for Solve<'_, S, BACKED, OWN> {
+impl<S: Scalar, const BACKED: bool, const OWN: bool, const LOCKED: bool> Kernel<S>
+    for Solve<'_, S, BACKED, OWN, LOCKED>
+{
     #[inline(always)]
     fn run<L: Simd<Scalar = S>>(self) {
         match self.pass {
@@ -97,98 +84,10 @@ impl<S: Scalar, const BACKED: bool, const OWN: bool> Kernel<S> for Solve<'_, S, 
     }
 }
 
-/// Numbers of the surfaces of a batch.
-#[derive(Clone, Copy)]
-struct Numbers<L> {
-    friction: L,
-    restitution: L,
-    tangential_restitution: L,
-    /// Mass times radius squared over the moment of inertia of both.
-    inertia_factors: [L; 2],
-}
-
-impl<L: Simd> Numbers<L> {
-    #[inline(always)]
-    fn load<const OWN: bool>(
-        own: &[PairNumbers<L::Scalar>],
-        batch: usize,
-        friction: L::Scalar,
-        restitution: L::Scalar,
-    ) -> Self {
-        if OWN {
-            let PairNumbers {
-                friction,
-                restitution,
-                tangential_restitution,
-                inertia_factors: [a, b],
-                ..
-            } = &own[batch];
-            Self {
-                friction: L::load(friction),
-                restitution: L::load(restitution),
-                tangential_restitution: L::load(tangential_restitution),
-                inertia_factors: [L::load(a), L::load(b)],
-            }
-        } else {
-            Self {
-                friction: L::splat(friction),
-                restitution: L::splat(restitution),
-                tangential_restitution: L::constant(0.0),
-                inertia_factors: [L::constant(BALL_INVERSE_INERTIA); 2],
-            }
-        }
-    }
-
-    /// One where a pair is no contact yet: it bears nothing and comes fast.
-    #[inline(always)]
-    fn fresh<const FIRST: bool>(
-        &self,
-        params: &SolverParams<L::Scalar>,
-        at: [&[L; 4]; 2],
-        velocity: [&[L; 4]; 2],
-        before: L,
-        [separation, parting]: [L; 2],
-    ) -> L {
-        let (zero, speed) = (L::constant(0.0), L::splat(params.restitution_threshold));
-        let fast = (zero - parting).select_gt(speed, L::constant(1.0), zero);
-        let fresh = before.select_gt(zero, zero, fast);
-        if fresh.gt_mask(zero) == 0 {
-            return fresh;
-        }
-        let bounces = self.restitution.select_gt(zero, fresh, zero);
-        // Where nothing bounces, all is a contact but what passes by far away.
-        let beside = (at[0][3] + at[1][3]) * L::constant(0.5);
-        let stops = self.restitution.select_gt(zero, zero, fresh);
-        let stops = separation.select_gt(beside, stops, zero);
-        let unsure = if FIRST { bounces + stops } else { stops };
-        if unsure.gt_mask(zero) == 0 {
-            return bounces;
-        }
-        // What meets nevertheless is stopped: it may come so fast only because of impulses that were
-        // applied again, and are taken back by the contacts that bear them.
-        let meets = meeting(params, at, velocity).approach_speed;
-        let missed = meets.select_gt(zero, zero, unsure);
-        if FIRST { missed } else { bounces + missed }
-    }
-
-    /// Effective mass of the touched points across the normal. `alone` is that along it.
-    #[inline(always)]
-    fn tangent_mass<const OWN: bool>(&self, alone: L, [a, b]: [&[L; 4]; 2]) -> L {
-        if OWN {
-            let one = L::constant(1.0);
-            let [of_a, of_b] = self.inertia_factors;
-            let sum = inverse_mass(a) * (one + of_a) + inverse_mass(b) * (one + of_b);
-            sum.select_gt(L::constant(0.0), one / sum, L::constant(0.0))
-        } else {
-            alone * L::constant(2.0 / 7.0)
-        }
-    }
-}
-
 impl<S: Scalar> SolverColumns<'_, S> {
     /// Applies an impulse to both balls of the pairs, with these factors of inertia.
     #[inline(always)]
-    fn apply_impulse<L: Simd<Scalar = S>, const BACKED: bool>(
+    fn apply_impulse<L: Simd<Scalar = S>, const BACKED: bool, const LOCKED: bool>(
         &self,
         batch: &Batch,
         [a, b]: [[L; 4]; 2],
@@ -216,6 +115,9 @@ impl<S: Scalar> SolverColumns<'_, S> {
             (by_b, borne_b) = borne_by_wall(by_b, &b, &back_b, speed_b);
             scatter(self.backing, batch, [borne_a, borne_b]);
         }
+        if LOCKED {
+            [by_a, by_b] = self.free_parts(batch, [by_a, by_b]);
+        }
         let velocity = [
             (Vec3Wide::of(&a) + by_a * mass_a).with(a[3]),
             (Vec3Wide::of(&b) + by_b * mass_b).with(b[3]),
@@ -240,7 +142,7 @@ impl<S: Scalar> SolverColumns<'_, S> {
 
     /// Lets those pairs bounce that meet. Says whether any does.
     #[inline(always)]
-    fn apply_restitution<L: Simd<Scalar = S>, const OWN: bool>(
+    fn apply_restitution<L: Simd<Scalar = S>, const OWN: bool, const LOCKED: bool>(
         &self,
         batch: &Batch,
         params: &SolverParams<S>,
@@ -262,29 +164,37 @@ impl<S: Scalar> SolverColumns<'_, S> {
         if !bounces && tipping.is_none() {
             return false;
         }
-        let relative = Vec3Wide::of(&b) - Vec3Wide::of(&a);
-        let mass = effective_mass(&a, &b);
-        let spins = self.spins(batch);
-        let slip = slip(relative, normal, &spins);
-        let one = L::constant(1.0);
-        let stopping = slip * (zero - numbers.tangent_mass::<OWN>(mass, [&a, &b]));
+        let point = Vec3Wide::of(&at_a) + Vec3Wide::of(&a) * time + normal * at_a[3];
+        let [pushed_a, pushed_b] = self.pushed::<L, LOCKED>(batch, &[a, b], normal);
+        let mass = effective_mass(&pushed_a, &pushed_b);
+        let (spins, factors) = (self.spins(batch), numbers.inertia_factors);
+        let (one, none) = (L::constant(1.0), Vec3Wide([zero; 3]));
         let restitution = tipping.map_or(numbers.restitution, |tipping| {
             tipping::restitution(tipping, numbers.restitution)
         });
-        let mut impulse = FrictionCone::new(numbers.friction).clamp(ContactImpulse {
-            normal: mass * approach_speed * (one + restitution),
-            tangent: stopping * (one + numbers.tangential_restitution),
-        });
+        let whole =
+            ContactImpulse { normal: mass * approach_speed * (one + restitution), tangent: none };
+        let (mut ends, mut left) = ([a, b], whole.normal);
+        if LOCKED {
+            // Along a lock it changes the slip too: both at once would add energy.
+            self.apply_impulse::<L, false, true>(batch, ends, spins, normal, whole, factors);
+            (ends, left) = (gather::<L>(self.velocity, batch), zero);
+        }
+        let relative = Vec3Wide::of(&ends[1]) - Vec3Wide::of(&ends[0]);
+        let slip = slip(relative, normal, &spins);
+        let stopping = slip * (zero - numbers.tangent_mass::<OWN>(mass, [&a, &b]));
+        let tangent = stopping * (one + numbers.tangential_restitution);
+        let mut impulse =
+            FrictionCone::new(numbers.friction).clamp(ContactImpulse { tangent, ..whole });
         if let Some(tipping) = tipping {
             impulse.tangent = impulse.tangent + tipping * mass;
         }
         if params.notes_impacts {
-            let point = Vec3Wide::of(&at_a) + Vec3Wide::of(&a) * time + normal * at_a[3];
             let vectors = [normal, point, slip, impulse.along(normal)];
             note_impacts(impacts, batch, approach_speed, vectors);
         }
-        let factors = numbers.inertia_factors;
-        self.apply_impulse::<L, false>(batch, [a, b], spins, normal, impulse, factors);
+        let rest = ContactImpulse { normal: left, ..impulse };
+        self.apply_impulse::<L, false, LOCKED>(batch, ends, spins, normal, rest, factors);
         bounces
     }
 
@@ -340,7 +250,9 @@ impl<S: Scalar> SolverColumns<'_, S> {
     }
 }
 
-impl<S: Scalar, const BACKED: bool, const OWN: bool> Solve<'_, S, BACKED, OWN> {
+impl<S: Scalar, const BACKED: bool, const OWN: bool, const LOCKED: bool>
+    Solve<'_, S, BACKED, OWN, LOCKED>
+{
     #[inline(always)]
     fn restitution<L: Simd<Scalar = S>>(self, params: SolverParams<S>) {
         let Self { columns, batches, impulses, friction, .. } = self;
@@ -353,8 +265,8 @@ impl<S: Scalar, const BACKED: bool, const OWN: bool> Solve<'_, S, BACKED, OWN> {
             let numbers =
                 Numbers::<L>::load::<OWN>(&impulses.numbers, i, friction, params.restitution);
             let (rows, impacts) = ((at, velocity), &mut impulses.impacts);
-            impulses.bounced |=
-                columns.apply_restitution::<L, OWN>(batch, &params, &numbers, rows, impacts);
+            impulses.bounced |= columns
+                .apply_restitution::<L, OWN, LOCKED>(batch, &params, &numbers, rows, impacts);
         }
     }
 
@@ -377,7 +289,7 @@ impl<S: Scalar, const BACKED: bool, const OWN: bool> Solve<'_, S, BACKED, OWN> {
                 let kept = zero.select_gt(back_b[3], zero, one - lost);
                 // Nor does it bear as much once it presses the ball along the wall: it parts them
                 // no faster than an overlap is pushed out.
-                let [a, b] = &velocity;
+                let [a, b] = &columns.pushed::<L, LOCKED>(batch, &velocity, normal);
                 let (alone, load) =
                     (effective_mass(a, b), columns.backing_of(batch, [a, b], normal).load);
                 let most = load * L::splat(params.softness.max_push_speed);
@@ -389,7 +301,9 @@ impl<S: Scalar, const BACKED: bool, const OWN: bool> Solve<'_, S, BACKED, OWN> {
             impulse.tangent.store(&mut tangent_impulse[i]);
             let numbers = Numbers::<L>::load::<OWN>(own, i, friction, params.restitution);
             let factors = numbers.inertia_factors;
-            columns.apply_impulse::<L, BACKED>(batch, velocity, spin, normal, impulse, factors);
+            columns.apply_impulse::<L, BACKED, LOCKED>(
+                batch, velocity, spin, normal, impulse, factors,
+            );
             if OWN {
                 let [a, b] = gather::<L>(columns.at, batch);
                 let inertia = RollingInertia::new([&a, &b], &velocity, factors);
@@ -422,11 +336,13 @@ impl<S: Scalar, const BACKED: bool, const OWN: bool> Solve<'_, S, BACKED, OWN> {
             if BACKED {
                 StruckContact::note(struck, &params, parting, (i, &normal_impulse[i]));
             }
-            let alone = effective_mass(&a, &b);
+            let [pushed_a, pushed_b] = columns.pushed::<L, LOCKED>(batch, &[a, b], normal);
+            let alone = effective_mass(&pushed_a, &pushed_b);
             let (target, softness) = target::<S, L, FIRST>(&params, separation, grounded);
             let slower = parting - target;
             let excess = if BACKED {
-                columns.backing_of(batch, velocity, normal).impulse(alone, slower)
+                let pushed = [&pushed_a, &pushed_b];
+                columns.backing_of(batch, pushed, normal).impulse(alone, slower)
             } else {
                 alone * slower
             };
@@ -444,16 +360,15 @@ impl<S: Scalar, const BACKED: bool, const OWN: bool> Solve<'_, S, BACKED, OWN> {
                 spin[3] =
                     impulse.normal.select_gt(zero, grounded.max(L::constant(TOUCHING)), spin[3]);
             }
-            let factors = numbers.inertia_factors;
-            columns.apply_impulse::<L, BACKED>(batch, [a, b], spins, normal, change, factors);
+            let (rows, factors) = ([a, b], numbers.inertia_factors);
+            columns.apply_impulse::<L, BACKED, LOCKED>(batch, rows, spins, normal, change, factors);
             if OWN {
-                let (inertia, load) =
-                    (RollingInertia::new(places, &[a, b], factors), impulse.normal);
+                let (inertia, load) = (RollingInertia::new(places, &rows, factors), impulse.normal);
                 columns.solve_rolling(batch, &inertia, normal, load, &own[i], &mut torque[i]);
             }
             if !FIRST {
                 let (contact, mark) = ((normal, separation), (grounded, change.normal));
-                *jammed |= columns.push_apart(batch, at, [a, b], contact, &params, mark);
+                *jammed |= columns.push_apart(batch, at, rows, contact, &params, mark);
             }
         }
     }

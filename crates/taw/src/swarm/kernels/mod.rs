@@ -8,12 +8,15 @@ use crate::response::Impact;
 use crate::workers::DisjointSlice;
 
 mod backing;
+mod columns;
 mod contact;
 mod displace;
 mod impacts;
 mod integrate;
+mod locks;
 mod meeting;
 mod near;
+mod numbers;
 mod params;
 mod rolling;
 mod sinking;

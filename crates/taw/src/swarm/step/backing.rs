@@ -14,6 +14,10 @@ use crate::workers::{DisjointSlice, parallel_for};
 /// pair sinks in by the mass ratio times the fall of a substep: by less than a millimetre times this.
 const UNEVEN: f64 = 8.0;
 
+/// Least [share](WallContact::share) of a wall behind a ball with locked axes: others turn what it bears
+/// out of its normal.
+const UNTURNED: f64 = 0.999;
+
 impl<S: Scalar> Swarm<S> {
     /// Finds for each ball the wall that bears most of it, where masses are so uneven that pairs
     /// need to know ([`SolverColumns::backing`]).
@@ -87,6 +91,9 @@ impl<S: Scalar> Swarm<S> {
                 let along = |contact: &WallContact<S>| contact.surface.dot(contact.normal);
                 for contact in of_ball {
                     let bears = contact.bears(&at[contact.row as usize]);
+                    if contact.share() < S::from_f64(UNTURNED) {
+                        continue;
+                    }
                     // A wall that bears a proxy gives way to it.
                     if bears > most && !(contact.bears_proxy && along(contact) != S::zero()) {
                         (most, behind, speed) = (bears, row(contact.normal), along(contact));

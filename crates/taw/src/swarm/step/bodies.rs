@@ -130,6 +130,7 @@ impl<S: Scalar> Swarm<S> {
             self.spin[rows[slot as usize] as usize][3] = S::from_f64(GROUNDED);
         }
         self.scratch.bodies = bodies;
+        self.hold_rows();
     }
 }
 

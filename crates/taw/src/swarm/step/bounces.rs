@@ -224,7 +224,7 @@ impl<S: Scalar> Swarm<S> {
             list.extend(chunks[i].wall_contacts.iter().filter_map(|contact| {
                 let row = contact.row as usize;
                 let bounce = contact.bounce(params, &at[row], &velocity[row])?;
-                Some(WayToWall::new(contact.row, &at[row], contact.normal * -bounce.separation))
+                Some(WayToWall::new(contact.row, &at[row], contact.way_nearer(bounce.separation)))
             }));
         });
         for list in lists {

@@ -7,6 +7,7 @@ use cgmath::{EuclideanSpace, InnerSpace, Zero};
 use crate::broad::Period;
 use crate::constraint::ContactImpulse;
 use crate::math::{Point3, Row, Scalar, Vec3, cast_vector};
+use crate::motion::LockedAxes;
 use crate::response::SolverBodies;
 use crate::response::impulse::VelocityContact;
 use crate::swarm::batches::Batch;
@@ -48,6 +49,7 @@ pub(super) struct UnconvergedCluster<S> {
     pub inverse_mass: Vec<f64>,
     pub spin: Vec<Vec3<f64>>,
     pub locked: Vec<bool>,
+    pub locked_axes: Vec<LockedAxes>,
 }
 
 /// Pairs of some rows: batch and lane.
@@ -118,6 +120,7 @@ impl<S: Scalar> UnconvergedCluster<S> {
             inverse_mass: &self.inverse_mass,
             spin: &mut self.spin,
             rotation_locked: &self.locked,
+            locked_axes: &self.locked_axes,
             capsules: &[],
         }
     }
@@ -139,6 +142,7 @@ impl<S: Scalar> UnconvergedCluster<S> {
             self.inverse_mass.push(swarm.free_inverse_mass(*row).as_f64());
             self.spin.push(vector(&spin) / radius);
             self.locked.push(surfaces.row(*row).rotation_locked);
+            self.locked_axes.push(surfaces.locked_axes(*row));
         }
     }
 
@@ -155,6 +159,9 @@ impl<S: Scalar> UnconvergedCluster<S> {
             // The first one with this normal bears it all.
             let is_behind = backing != [S::zero(); 4] && xyz(&backing) == contact.normal;
             let share = is_behind.then(|| std::mem::take(&mut backing)[3].max(S::zero()));
+            if contact.share() == S::zero() {
+                continue; // a lock bears it
+            }
             let normal_impulse = contact.impulse.normal + share.unwrap_or_default();
             let separation = contact.separation(at);
             if normal_impulse == S::zero()
@@ -188,6 +195,13 @@ impl<S: Scalar> UnconvergedCluster<S> {
         let [a, b] = rows.map(|row| self.local_index(row));
         let displacement = self.position[b as usize] - self.position[a as usize];
         let distance = displacement.magnitude();
+        let gives = |i: u32| {
+            let share: f64 = self.locked_axes[i as usize].share(displacement / distance);
+            share * self.inverse_mass[i as usize]
+        };
+        if gives(a) + gives(b) == 0.0 {
+            return; // locks bear it
+        }
         let separation = distance - self.radius[a as usize] - self.radius[b as usize];
         self.locations.push(ContactLocation::Pair(place));
         self.contacts.push(VelocityContact {

@@ -4,10 +4,10 @@ use cgmath::Zero;
 
 use crate::body::{BodySystem, SolverBody};
 use crate::joint::{JointBody, JointOwner, JointSystem};
-use crate::math::{Row, Scalar, Vec3, cast_vector};
+use crate::math::{Scalar, Vec3, cast_vector};
 use crate::swarm::Swarm;
 use crate::swarm::kernels::{Pass, SolverParams};
-use crate::swarm::wall_contact::xyz;
+use crate::swarm::wall_contact::{set, xyz};
 
 impl<S: Scalar> Swarm<S> {
     /// Sets the joints of the next step, between bodies by their slots.
@@ -29,6 +29,7 @@ impl<S: Scalar> Swarm<S> {
     /// `share` is the length of a substep over the number of substeps in a step.
     pub(super) fn solve_contacts_and_joints(&mut self, params: &SolverParams<S>, share: S) {
         let h = params.time.as_f64();
+        self.begin_bodies(params);
         self.pass(Pass::WarmStart(*params), |_, _| true);
         self.with_bodies(BodySystem::warm_start);
         if self.has_joints() {
@@ -47,6 +48,7 @@ impl<S: Scalar> Swarm<S> {
     /// Makes velocities at the end of a substep those that contacts and joints allow.
     pub(super) fn relax_contacts_and_joints(&mut self, params: SolverParams<S>) {
         let h = params.time.as_f64();
+        self.with_bodies(|bodies| bodies.advance(h));
         self.with_joints(|joints| {
             joints.advance(h);
             joints.begin_relaxation(h);
@@ -82,6 +84,7 @@ impl<S: Scalar> Swarm<S> {
                     let change = Vec3::from(self.velocity_changes[own].change);
                     body.fall += cast_vector(change * (half * share));
                 }
+                body.fall = body.locked_axes.free_translation(body.fall);
             }
         }
         self.scratch.joints = joints;
@@ -133,10 +136,6 @@ impl<S: Scalar> Swarm<S> {
             }
         }
         self.scratch.joints = joints;
+        self.hold_rows(); // to the bit
     }
-}
-
-/// Sets the vector of a row.
-fn set<S: Scalar>(row: &mut Row<S>, Vec3 { x, y, z }: Vec3<S>) {
-    *row = [x, y, z, row[3]];
 }

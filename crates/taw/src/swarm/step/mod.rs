@@ -7,6 +7,7 @@ mod cluster;
 mod islands;
 mod joints;
 mod lab;
+mod locks;
 mod overflow;
 mod passages;
 mod paths;
@@ -17,6 +18,7 @@ mod wall_contacts;
 
 pub(crate) use bodies::BallView;
 pub(super) use bounces::WayToWall;
+pub(super) use locks::LockedRows;
 pub(super) use passages::SavedPlace;
 pub(super) use sleep::inverse_masses;
 use wall_contacts::WallPass;
@@ -26,6 +28,7 @@ use super::build::SOON;
 use super::chunk::Chunk;
 use super::fast_movers::FastMovers;
 use super::kernels::{IntegratePositions, Pass, SolverColumns, SolverParams, solve, squared};
+use super::scratch::SwarmScratch;
 use super::state::KnownIdentity;
 use super::walls::half_spaces;
 use super::{Stage, StaticGeometry, Swarm, Tier};
@@ -195,11 +198,11 @@ impl<S: Scalar> Swarm<S> {
     ) {
         self.scratch.backing.clear(); // of other rows
         self.scratch.backing_speed.clear();
-        let is_idle = !self.pairs_valid || self.chunks.iter().all(|chunk| chunk.asleep);
-        if is_idle && !self.has_bodies() {
+        if self.has_none_awake() && !self.has_bodies() {
             return;
         }
         self.list_proxy_rows();
+        self.save_held_rows();
         observe(Stage::Restitute);
         let gravity = self.gravity.unwrap_or_else(Vec3::zero);
         let (zero, half, substeps) = (S::zero(), S::from_f64(0.5), S::from_f64(f64::from(count)));
@@ -224,7 +227,6 @@ impl<S: Scalar> Swarm<S> {
             self.integrate(row(gravity * h), [zero; 4], [zero; 4]);
             self.advance_proxies(parts, false, zero);
             observe(Stage::Restitute);
-            self.begin_bodies(&params);
             self.find_backing();
             self.solve_contacts_and_joints(&params, h / substeps);
             self.record_contact_impulses(S::one());
@@ -234,10 +236,10 @@ impl<S: Scalar> Swarm<S> {
             self.integrate([zero; 4], [h, h, h, zero], row(gravity * (-half * h * h)));
             self.correct_free_flight(-half * h / substeps);
             self.shorten_paths();
+            self.hold_rows();
             let caught = self.stop_at_walls(walls, h, gravity * (half * h * h));
             self.scratch.path_changes.clear();
             self.advance_proxies(parts, true, h);
-            self.with_bodies(|bodies| bodies.advance(h.as_f64()));
             let (skin, before, left) = (self.skin, left, left - h);
             let left_it = |_, _: &Row<S>, skin_left: S, _: &FastMovers<S>| skin_left < -skin;
             if self.find_pairs_within_step(|chunk| chunk.overrun, left_it, dt, walls, observe) {
@@ -252,7 +254,13 @@ impl<S: Scalar> Swarm<S> {
             self.forget_impacts();
             self.keep_out(walls, [before, left]);
             self.follow_kinematic_paths(parts[1], dt);
+            self.hold_rows();
         }
+    }
+
+    /// Returns true if all balls sleep.
+    fn has_none_awake(&self) -> bool {
+        !self.pairs_valid || self.chunks.iter().all(|chunk| chunk.asleep)
     }
 
     /// Parameters of a substep of `h` seconds in a step of `dt` seconds.
@@ -366,17 +374,14 @@ impl<S: Scalar> Swarm<S> {
     /// Changes velocities and moves the balls that are awake.
     fn integrate(&mut self, change: Row<S>, time: Row<S>, correction: Row<S>) {
         let simd_level = *self.simd_level;
-        let columns = SolverColumns {
-            at: DisjointSlice::new(&mut self.at),
-            velocity: DisjointSlice::new(&mut self.velocity),
-            spin: DisjointSlice::new(&mut self.spin),
-            skin_left: DisjointSlice::new(&mut self.skin_left),
-            backing: DisjointSlice::new(&mut self.scratch.backing),
-            backing_speed: DisjointSlice::new(&mut self.scratch.backing_speed),
-        };
+        let SwarmScratch { threads, backing, backing_speed, locks, .. } = &mut self.scratch;
+        let columns = SolverColumns::new(
+            [&mut self.at, &mut self.velocity, &mut self.spin, backing, &mut locks.free_axes],
+            [&mut self.skin_left, backing_speed],
+        );
         let chunks = DisjointSlice::new(&mut self.chunks);
         let least = -self.skin;
-        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
+        parallel_for(*threads, chunks.len(), |_, chunk| {
             // SAFETY: each thread has its own chunks, and their rows.
             let chunk = unsafe { &mut *chunks.row(chunk) };
             if chunk.asleep {
@@ -408,12 +413,14 @@ impl<S: Scalar> Swarm<S> {
                 first,
             });
         });
+        self.hold_rows();
     }
 
     /// Goes over all contacts of the chunks that are awake or beside one, and of which the
     /// condition holds, given how fast a ball of the next one is.
     fn pass(&mut self, pass: Pass<S>, condition: impl Fn(&Chunk<S>, S) -> bool + Sync) {
         self.mark_idle_batches();
+        self.find_free_axes();
         let simd_level = *self.simd_level;
         let friction = self.common_material().friction;
         let mut fast_movers = std::mem::take(&mut self.fast_movers);
@@ -439,18 +446,16 @@ impl<S: Scalar> Swarm<S> {
                 of_walls.solve(pass, columns, chunk);
             }
         });
-        let columns = SolverColumns {
-            at: DisjointSlice::new(&mut self.at),
-            velocity: DisjointSlice::new(&mut self.velocity),
-            spin: DisjointSlice::new(&mut self.spin),
-            skin_left: DisjointSlice::new(&mut self.skin_left),
-            backing: DisjointSlice::new(&mut self.scratch.backing),
-            backing_speed: DisjointSlice::new(&mut self.scratch.backing_speed),
-        };
+        let SwarmScratch { backing, backing_speed, locks, .. } = &mut self.scratch;
+        let columns = SolverColumns::new(
+            [&mut self.at, &mut self.velocity, &mut self.spin, backing, &mut locks.free_axes],
+            [&mut self.skin_left, backing_speed],
+        );
         let FastMovers { batches, impulses, .. } = &mut fast_movers;
         solve(simd_level, pass, columns, batches, impulses, friction);
         (self.fast_movers, self.scratch.held) = (fast_movers, held);
         self.scratch.outside_work = outside_work;
+        self.hold_rows();
     }
 
     /// Runs a job on all chunks, each with exclusive access to the balls of it and of the next one. The
@@ -459,17 +464,14 @@ impl<S: Scalar> Swarm<S> {
         &mut self,
         job: impl Fn(Option<(bool, S)>, SolverColumns<S>, &mut Chunk<S>) + Sync,
     ) {
-        let columns = SolverColumns {
-            at: DisjointSlice::new(&mut self.at),
-            velocity: DisjointSlice::new(&mut self.velocity),
-            spin: DisjointSlice::new(&mut self.spin),
-            skin_left: DisjointSlice::new(&mut self.skin_left),
-            backing: DisjointSlice::new(&mut self.scratch.backing),
-            backing_speed: DisjointSlice::new(&mut self.scratch.backing_speed),
-        };
+        let SwarmScratch { threads, chunk_states, backing, backing_speed, locks, .. } =
+            &mut self.scratch;
+        let columns = SolverColumns::new(
+            [&mut self.at, &mut self.velocity, &mut self.spin, backing, &mut locks.free_axes],
+            [&mut self.skin_left, backing_speed],
+        );
         let chunks = DisjointSlice::new(&mut self.chunks);
-        let (threads, states) = (self.scratch.threads, &mut self.scratch.chunk_states);
-        parallel_for_odd_even(threads, chunks.len(), states, |chunk| {
+        parallel_for_odd_even(*threads, chunks.len(), chunk_states, |chunk| {
             // SAFETY: nobody works on a neighbour meanwhile. Of the next one, only what nobody
             // changes is read.
             unsafe {

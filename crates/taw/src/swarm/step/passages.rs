@@ -138,7 +138,9 @@ impl<S: Scalar> Swarm<S> {
                     continue;
                 }
                 if let Some([x, y, z]) = walls.stop_passage([&place, at], filter, before_end) {
-                    let end = [x, y, z, at[3]];
+                    let slides = surfaces.locked_axes(row as u32).moves_freely();
+                    // What has locked axes may not slide as the wall says.
+                    let end = if slides { [x, y, z, at[3]] } else { place };
                     *skin_left -= distance(at, &end);
                     *at = end;
                 }

@@ -177,11 +177,13 @@ impl<S: Scalar> Swarm<S> {
                     || xyz(velocity) * h - lower + change,
                     |place| xyz(at) - Vec3::from(place),
                 );
+                let locks = surfaces.locked_axes(row as u32);
+                let path = locks.free_translation(path);
                 let far = S::from_f64(FAST) * at[3];
                 if is_fast(velocity, h, at[3]) || !change.is_zero() || path.magnitude2() > far * far
                 {
                     let filter = surfaces.filter(row as u32);
-                    let back = slide_along_wall(walls, at, filter, path);
+                    let back = slide_along_wall(walls, at, (filter, locks), path);
                     *skin_left -= back;
                     chunk.caught |= back > S::zero();
                 }

@@ -131,7 +131,7 @@ impl<S: Scalar> World<S> {
             let was_listed = || plane.signed_distance(from) - radius <= self.scratch.reach;
             let is_listed = || self.contacts.wm.iter().any(|c| (c.a, c.b) == (wall, row as u32));
             if is_deep && (!was_listed() || is_listed()) {
-                center -= plane.normal() * gap;
+                center -= self.marbles.locked_axes_of_row(row).escape(plane.normal()) * gap;
             }
         }
         if is_finite_point(center) {

@@ -154,12 +154,14 @@ impl<S: Scalar> World<S> {
         let mut surfaces: SmallVec<[Vec3<S>; MAX_BENDS as usize]> = SmallVec::new();
         let mut carrier = None;
         while surfaces.len() < MAX_BENDS as usize
-            && let Some(impact) = self.first_wall_impact(
+            && let Some(mut impact) = self.first_wall_impact(
                 row,
                 &marble,
                 MarbleMotion { displacement, time: left * dt, carrier },
             )
         {
+            // The path bends within free axes.
+            impact.normal = self.marbles.locked_axes_of_row(row).free_normal(impact.normal);
             let WallImpact { time, normal, center, anchor, swing, ref place, .. } = impact;
             let (wall, rest, carried) = (impact.part.wall, S::one() - time, place.carried);
             turn.add(&marble, time, left);

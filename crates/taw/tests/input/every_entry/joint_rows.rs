@@ -1,4 +1,4 @@
-//! Rows of the table for joints.
+//! Rows of the table for joints, and for locked axes.
 
 use taw::Error;
 use taw::joint::{Joint, JointDrive, JointEnd, JointKind, JointMotor, JointSpring};
@@ -28,6 +28,11 @@ pub fn joints<S: Scalar>() -> Vec<Row<S>> {
             let ends = [JointEnd::world(Point3::new(S::zero(), S::one(), S::zero())), JointEnd::marble(p.subject, Vec3::new(S::zero(), S::zero(), S::zero()))];
             let joint = Joint::new(JointKind::BallAndSocket, ends);
             with_joint(p, if p.case == 0 { Joint { breaking_force: x, ..joint } } else { Joint { breaking_torque: x, ..joint } })
+        };
+        Marble 6 "Marbles::set_locked_axes Marble.locked_axes": |p, _x| {
+            if p.world.model().response == Response::EventDriven { return Ok(()) } // has a name of its own
+            let axes = LockedAxes::try_from([1, 4, 12, 38, 56, 63][p.case])?;
+            p.world.marbles.set_locked_axes(p.subject, axes)
         };
     }
 }
