@@ -4,6 +4,7 @@
 mod balls;
 mod blender;
 mod board;
+mod bodies;
 mod capsules;
 mod contact_forces;
 mod contact_points;

@@ -36,7 +36,7 @@ use crate::scatter::Frame;
 ///     commands.spawn((Body::from(Cuboid::new(0.4, 0.2, 0.6)), Transform::from_xyz(0.0, 2.0, 0.0)));
 /// }
 /// ```
-#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 #[require(Transform, BodyState)]
 pub struct Body {
@@ -70,11 +70,18 @@ pub enum BodyShape {
     Hull(Vec<Vec3>),
 }
 
+impl Default for Body {
+    /// Cube of a metre, like Bevy's `Cuboid`.
+    fn default() -> Self {
+        Self::from(Cuboid::default())
+    }
+}
+
 impl Body {
     /// Body of one convex shape.
     #[must_use]
     pub fn new(shape: BodyShape) -> Self {
-        Self::default().with_part(shape, Vec3::ZERO, Quat::IDENTITY)
+        Self { parts: Vec::new() }.with_part(shape, Vec3::ZERO, Quat::IDENTITY)
     }
 
     /// Adds a convex part at a place in the entity's frame, in metres.
@@ -144,6 +151,8 @@ pub(crate) struct BodyState {
     pub id: Option<BodyId>,
     /// Components as gather or scatter last left them.
     seen: SeenBody,
+    /// True if they could be no body: that is tried again when they change.
+    refused: bool,
 }
 
 /// Components of a body to the bit, so that even a NaN is seen only once.
@@ -188,8 +197,23 @@ pub(crate) fn gather(
     mut bodies: Query<BodyComponents>,
     transforms: TransformHelper,
     mut refusals: Refusals,
+    mut was_known: Local<bool>,
 ) {
+    let is_known = world.model().response.knows_bodies();
+    let again = !std::mem::replace(&mut *was_known, is_known) && is_known;
     for (entity, body, transform, parent, (velocity, spin), settings, mut state) in &mut bodies {
+        if !is_known {
+            if let Some(id) = state.id.take() {
+                let _ = world.bodies.remove(id); // or the game took it out by itself
+                world.body_entities.remove(&id);
+            }
+            if !std::mem::replace(&mut state.refused, true) {
+                let response = "a response other than SoftStep";
+                let error = taw::Error::Unsupported { response, feature: "rigid bodies" };
+                refusals.check(Some(entity), Err::<(), _>(error));
+            }
+            continue;
+        }
         let (mass, gravity_scale, damping, material, layers, sleeping_disabled) = settings;
         let seen = SeenBody {
             place: (bits(transform.translation), rotation_bits(transform.rotation)),
@@ -203,9 +227,10 @@ pub(crate) fn gather(
                 sleeping_disabled,
             },
         };
+        state.refused &= !again;
         let id = state.id.filter(|id| world.bodies.pose(*id).is_ok());
         let last = std::mem::replace(&mut state.seen, seen);
-        if id.is_some() && last == seen && !body.is_changed() {
+        if (id.is_some() || state.refused) && last == seen && !body.is_changed() {
             continue;
         }
         let is_new = id.is_none();
@@ -245,10 +270,11 @@ pub(crate) fn gather(
         };
         match set(&mut world) {
             Ok(id) => {
-                state.id = Some(id);
+                (state.id, state.refused) = (Some(id), false);
                 world.body_entities.insert(id, entity);
             }
             Err(error) => {
+                state.refused = true;
                 refusals.check(Some(entity), Err::<(), _>(error));
             }
         }

@@ -32,7 +32,7 @@ use crate::resources::TawWorld;
 /// }
 /// ```
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
-#[reflect(Component, Debug, PartialEq)]
+#[reflect(Component, Debug, Default, PartialEq)]
 #[require(JointState)]
 pub struct Joint {
     /// Motions that it leaves free.
@@ -146,9 +146,24 @@ pub struct JointBroken {
     pub joint: Entity,
 }
 
-/// Handle of a joint in the physics.
+/// State of a joint entity in the physics.
 #[derive(Component, Clone, Copy, Debug, Default)]
-pub(crate) struct JointState(Option<JointId>);
+pub(crate) struct JointState {
+    id: Option<JointId>,
+    /// True if it could be no joint: that is tried again when it changes.
+    refused: bool,
+}
+
+impl Default for Joint {
+    /// Ball-and-socket joint of nothing, to be written to.
+    fn default() -> Self {
+        Self::new(
+            JointKind::BallAndSocket,
+            JointEnd::world(Vec3::ZERO),
+            JointEnd::world(Vec3::ZERO),
+        )
+    }
+}
 
 impl Joint {
     /// Joint that never breaks, and whose two do not collide with each other.
@@ -227,15 +242,23 @@ pub(crate) fn gather(
     mut refusals: Refusals,
     mut commands: Commands,
 ) {
+    let is_known = world.model().response.knows_bodies();
     let (mut ready, mut loose) = (Vec::new(), Vec::new());
     for (entity, joint, mut state) in &mut joints {
-        let known = state.0.filter(|id| world.joints.get(*id).is_ok());
-        if state.0.is_some() && known.is_none() {
+        if !is_known {
+            if let Some(id) = state.id.take() {
+                let _ = world.joints.remove(id); // or the game took it out by itself
+                world.joint_entities.remove(&id);
+            }
+            continue; // its bodies say why, or its marbles go on without it
+        }
+        let known = state.id.filter(|id| world.joints.get(*id).is_ok());
+        if state.id.is_some() && known.is_none() {
             loose.push(entity); // an end is gone
-            state.0 = None;
+            state.id = None;
             continue;
         }
-        if known.is_some() && !joint.is_changed() {
+        if (known.is_some() || state.refused) && !joint.is_changed() {
             continue;
         }
         let mut ends = [None; 2];
@@ -284,10 +307,13 @@ pub(crate) fn gather(
             Ok(id) => {
                 world.joint_entities.insert(id, entity);
                 if let Ok((.., mut state)) = joints.get_mut(entity) {
-                    state.0 = Some(id);
+                    *state = JointState { id: Some(id), refused: false };
                 }
             }
             Err(error) => {
+                if let Ok((.., mut state)) = joints.get_mut(entity) {
+                    state.refused = true;
+                }
                 refusals.check(Some(entity), Err::<(), _>(error));
             }
         }
@@ -314,7 +340,7 @@ pub(crate) fn report_broken(
 
 /// Takes a joint out of the world when its component or entity goes.
 pub(crate) fn forget(removed: On<Remove, Joint>, mut app: DeferredWorld) {
-    let id = app.get::<JointState>(removed.entity).and_then(|state| state.0);
+    let id = app.get::<JointState>(removed.entity).and_then(|state| state.id);
     let mut world = app.resource_mut::<TawWorld>();
     if let Some(id) = id {
         let _ = world.joints.remove(id); // or it broke, or an end went

@@ -72,6 +72,8 @@ pub const TABLE: &[(&str, &str, Takes)] = &[
     ("GravityZone", ".0", Takes::Finite),
     ("WindZone", ".velocity", Takes::Finite),
     ("WindZone", ".drag", Takes::AtLeastZero),
+    ("Body", "", Takes::Some),
+    ("Joint", "", Takes::Some),
     ("Swarm", ".tint", Takes::All), // drawn only
     ("Gravity", ".0", Takes::Finite),
     ("SubstepDelta", ".0", Takes::All), // set before each step
@@ -160,6 +162,10 @@ const BELOW: Transform = Transform::from_xyz(0.0, -5.0, 0.0);
 pub const OF_WALLS: &[&str] =
     &["Wall", "SurfaceMaterial", "SurfaceVelocity", "OneWay", "Transform"];
 
+/// Known by `SoftStep` alone.
+pub const OF_BODIES: &[&str] = &["Body"];
+pub const OF_JOINTS: &[&str] = &["Joint"];
+
 pub fn samples() -> Vec<Sample> {
     let mut samples: Vec<Sample> = vec![
         (marble, OF_MARBLES),
@@ -202,5 +208,32 @@ pub fn samples() -> Vec<Sample> {
         (|it| tinted(it, Tint::Size(0.1, 1.0)), &["Swarm"]),
         (|it| tinted(it, Tint::Plain([0.5; 3])), &["Swarm"]),
     ] as [Sample; 6]);
+    samples.extend([
+        (
+            |it| {
+                let ball = BodyShape::Sphere(Sphere::new(0.5));
+                let body = Body::from(Cuboid::new(1.0, 2.0, 3.0));
+                it.insert((body.with_part(ball, Vec3::X, Quat::IDENTITY), BELOW));
+            },
+            OF_BODIES,
+        ),
+        (
+            |it| {
+                let points = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+                let body = Body::from(Capsule3d::new(0.5, 1.0));
+                it.insert((
+                    body.with_part(BodyShape::Hull(points), Vec3::X, Quat::IDENTITY),
+                    BELOW,
+                ));
+            },
+            OF_BODIES,
+        ),
+        (
+            |it| {
+                it.insert(Joint::default());
+            },
+            OF_JOINTS,
+        ),
+    ] as [Sample; 3]);
     samples
 }

@@ -146,6 +146,12 @@ impl Response {
         self != Self::EventDriven
     }
 
+    /// Returns false for responses that refuse rigid bodies and joints.
+    #[must_use]
+    pub fn knows_bodies(self) -> bool {
+        self == Self::SoftStep
+    }
+
     /// True if only contacts with penetration matter: no speculative margin.
     pub(crate) fn needs_penetration(self) -> bool {
         matches!(self, Self::Penalty(_))

@@ -20,7 +20,7 @@ pub(super) struct BodyScratch<S> {
 impl<S: Scalar> World<S> {
     /// Refuses bodies where the response has no method for them.
     pub(super) fn check_bodies(&self) -> Result<(), Error> {
-        if self.bodies.is_empty() || self.settings.model.response.uses_swarm_rows() {
+        if self.bodies.is_empty() || self.settings.model.response.knows_bodies() {
             return Ok(());
         }
         Err(Error::Unsupported {

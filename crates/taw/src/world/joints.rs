@@ -42,7 +42,7 @@ enum Jointed {
 impl<S: Scalar> World<S> {
     /// Refuses joints where the response has no method for them.
     pub(super) fn check_joints(&self) -> Result<(), Error> {
-        if self.joints.is_empty() || self.settings.model.response.uses_swarm_rows() {
+        if self.joints.is_empty() || self.settings.model.response.knows_bodies() {
             return Ok(());
         }
         Err(Error::Unsupported { response: "a response other than SoftStep", feature: "joints" })
