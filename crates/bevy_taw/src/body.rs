@@ -258,7 +258,7 @@ pub(crate) fn gather(
             }
             let mass = mass.copied().unwrap_or_default();
             now.mass = core::BodyMass::Uniform(mass.into());
-            now.gravity_scale = **gravity_scale.copied().unwrap_or_default();
+            now.gravity_scale = *gravity_scale.copied().unwrap_or_default();
             now.damping = damping.map_or([0.0; 2], |d| [d.linear, d.angular]);
             now.material = material.map(|m| (*m).into()).unwrap_or_default();
             now.layers = layers.copied().unwrap_or_default().into();

@@ -291,9 +291,12 @@ fn add_scatter(app: &mut App) {
         (
             sleep::unmark,
             scatter::marbles,
-            sleep::mark,
-            body::scatter.run_if(any_with_component::<Body>),
-            joint::report_broken.run_if(any_with_component::<Joint>),
+            (
+                sleep::mark,
+                body::scatter.run_if(any_with_component::<Body>),
+                joint::report_broken.run_if(any_with_component::<Joint>),
+            )
+                .chain(),
             refusal::report_stopped,
             swarm::report_stopped,
             sensor::scatter,
