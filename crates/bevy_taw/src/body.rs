@@ -26,7 +26,8 @@ use crate::scatter::Frame;
 /// center of mass), [`SleepingDisabled`], and [`Sleeping`] to read. Its scale does not count.
 ///
 /// Bodies need [`Response::SoftStep`](taw::response::Response::SoftStep), the default. They are in no message of
-/// contacts, sensor or query yet.
+/// contacts, sensor or query yet, and [`LockedAxes`](crate::locked_axes::LockedAxes) does not hold them; force fields and
+/// zones do not act on them.
 ///
 /// ```
 /// use bevy::prelude::*;
@@ -142,6 +143,14 @@ impl BodyPart {
 
 fn pose(translation: Vec3, rotation: Quat) -> Pose<f32> {
     Pose { rotation: to_rotation(rotation), translation: to_vector(translation) }
+}
+
+impl TawWorld {
+    /// Handle of an entity's body in [`World::bodies`](taw::world::World::bodies).
+    #[must_use]
+    pub fn body_id(&self, body: Entity) -> Option<BodyId> {
+        self.body_entities.iter().find_map(|(id, entity)| (*entity == body).then_some(*id))
+    }
 }
 
 /// State of a body entity in the physics.

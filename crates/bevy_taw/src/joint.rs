@@ -51,7 +51,8 @@ pub struct Joint {
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct JointEnd {
-    /// Marble or body; none for a place in the world, which may move.
+    /// Marble or body; none for a place in the world. One that is written elsewhere moves there within the next
+    /// step, and carries on what hangs on it: so a joint hangs on a wall that moves, which is no end itself.
     pub entity: Option<Entity>,
     /// Anchor in the frame of the entity, or in the world, in metres.
     pub anchor: Vec3,
@@ -107,9 +108,9 @@ pub struct JointDrive {
 pub enum JointKind {
     /// Anchors coincide.
     BallAndSocket,
-    /// Turn about z.
+    /// Turn about z: that of the second end relative to the first, counterclockwise where z points at the viewer.
     Hinge(JointDrive),
-    /// Way along x of the first end.
+    /// Way of the second end along x of the first.
     Slider(JointDrive),
     /// No motion.
     Fixed,
@@ -231,6 +232,28 @@ impl From<JointKind> for core::JointKind<f32> {
             }
             JointKind::Gear { ratio } => Self::Gear { ratio },
         }
+    }
+}
+
+impl TawWorld {
+    /// Handle of an entity's joint in [`World::joints`](taw::world::World::joints), by which its force and torque are
+    /// read.
+    ///
+    /// ```
+    /// # use bevy::prelude::*;
+    /// # use bevy_taw::prelude::*;
+    /// fn creak(hinges: Query<Entity, With<Joint>>, world: Res<TawWorld>) -> Result {
+    ///     for id in hinges.iter().filter_map(|hinge| world.joint_id(hinge)) {
+    ///         if world.joints.force(id)? > 500.0 {
+    ///             info!("creak");
+    ///         }
+    ///     }
+    ///     Ok(())
+    /// }
+    /// ```
+    #[must_use]
+    pub fn joint_id(&self, joint: Entity) -> Option<JointId> {
+        self.joint_entities.iter().find_map(|(id, entity)| (*entity == joint).then_some(*id))
     }
 }
 

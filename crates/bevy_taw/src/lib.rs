@@ -39,8 +39,13 @@
 //! |---|---|
 //! | [`components`] | marbles, walls, and what they may have |
 //! | [`resources`] | the model, gravity, the world |
+//! | [`body`] | rigid bodies: boxes, capsules, hulls, compounds |
+//! | [`joint`] | hinges, sliders, rods, springs, wheels between marbles and bodies |
+//! | [`locked_axes`] | axes along which marbles do not move |
 //! | [`swarm`] | marbles in bulk that are no entities |
-//! | [`messages`] | contacts that start, go on and end |
+//! | [`messages`] | contacts that start, go on and end, and each contact of a pair |
+//! | [`contact_force`] | loads of marbles and walls |
+//! | [`layers`] | who collides with whom |
 //! | [`sensor`] | shapes that report which marbles and balls enter and leave |
 //! | [`grounded`] | the ground under marbles |
 //! | [`controller`] | marbles that a player rolls |
