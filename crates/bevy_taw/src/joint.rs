@@ -41,10 +41,10 @@ pub struct Joint {
     pub ends: [JointEnd; 2],
     /// True if the two that it holds collide with each other.
     pub collide_connected: bool,
-    /// Force in N beyond which it breaks; infinite for never.
-    pub breaking_force: f32,
-    /// Torque in N m beyond which it breaks; infinite for never.
-    pub breaking_torque: f32,
+    /// Force in N beyond which it breaks; none for never.
+    pub breaking_force: Option<f32>,
+    /// Torque in N m beyond which it breaks; none for never.
+    pub breaking_torque: Option<f32>,
 }
 
 /// End of a joint.
@@ -174,8 +174,8 @@ impl Joint {
             kind,
             ends: [first, second],
             collide_connected: false,
-            breaking_force: f32::INFINITY,
-            breaking_torque: f32::INFINITY,
+            breaking_force: None,
+            breaking_torque: None,
         }
     }
 }
@@ -315,8 +315,8 @@ pub(crate) fn gather(
                     ends: [first, second],
                     kind: joint.kind.into(),
                     collide_connected: joint.collide_connected,
-                    breaking_force: joint.breaking_force,
-                    breaking_torque: joint.breaking_torque,
+                    breaking_force: joint.breaking_force.unwrap_or(f32::INFINITY),
+                    breaking_torque: joint.breaking_torque.unwrap_or(f32::INFINITY),
                 },
             ));
         }

@@ -230,7 +230,7 @@ pub fn samples() -> Vec<Sample> {
         ),
         (
             |it| {
-                it.insert(Joint::default());
+                it.insert((Joint::default(), BELOW));
             },
             OF_JOINTS,
         ),

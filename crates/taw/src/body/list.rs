@@ -237,6 +237,7 @@ impl<S: Scalar> Bodies<S> {
     pub fn set_pose(&mut self, id: BodyId, pose: Pose<S>) -> Result<(), Error> {
         let row = self.row(id)?;
         let Pose { rotation, translation } = pose.validated()?;
+        super::place(Point3::from_vec(translation))?;
         self.wake_beside(id);
         let state = &mut self.states[row];
         state.wake();
@@ -258,9 +259,8 @@ impl<S: Scalar> Bodies<S> {
         angular_velocity: Vec3<S>,
     ) -> Result<(), Error> {
         let row = self.row(id)?;
-        let velocity = finite_vector(["velocity.x", "velocity.y", "velocity.z"], velocity)?;
-        let names = ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"];
-        let spin = finite_vector(names, angular_velocity)?;
+        super::motion(velocity, angular_velocity)?;
+        let spin = angular_velocity;
         let state = &mut self.states[row];
         state.wake();
         (state.solver.velocity, state.solver.momentum) = (cast_vector(velocity), None);

@@ -76,6 +76,31 @@ pub struct Body<S> {
     pub sleeping_disabled: bool,
 }
 
+/// Largest coordinate in metres, speed in m/s and angular speed in rad/s.
+const MAX_NUMBER: f64 = 1e12;
+
+/// Checks a place.
+fn place<S: Scalar>(at: Point3<S>) -> Result<(), Error> {
+    let at = finite_point(["position.x", "position.y", "position.z"], at)?;
+    bounded(["position.x", "position.y", "position.z"], at.into())
+}
+
+/// Checks a velocity and an angular velocity.
+fn motion<S: Scalar>(velocity: Vec3<S>, spin: Vec3<S>) -> Result<(), Error> {
+    let names = ["velocity.x", "velocity.y", "velocity.z"];
+    bounded(names, finite_vector(names, velocity)?.into())?;
+    let names = ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"];
+    bounded(names, finite_vector(names, spin)?.into())
+}
+
+fn bounded<S: Scalar>(names: [&'static str; 3], numbers: [S; 3]) -> Result<(), Error> {
+    let most = S::from_f64(MAX_NUMBER);
+    names
+        .into_iter()
+        .zip(numbers)
+        .try_for_each(|(name, x)| within(name, x, -most, most).map(|_| ()))
+}
+
 impl<S: Scalar> Body<S> {
     /// Body of this shape at rest, with the density of glass.
     pub fn new(shape: impl Into<Shape<S>>, position: Point3<S>) -> Self {
@@ -123,10 +148,8 @@ impl<S: Scalar> Body<S> {
 
     /// Returns the body if all its numbers are in range.
     pub(crate) fn validated(self) -> Result<Self, Error> {
-        finite_point(["position.x", "position.y", "position.z"], self.position)?;
-        finite_vector(["velocity.x", "velocity.y", "velocity.z"], self.velocity)?;
-        let names = ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"];
-        finite_vector(names, self.angular_velocity)?;
+        place(self.position)?;
+        motion(self.velocity, self.angular_velocity)?;
         finite("gravity_scale", self.gravity_scale)?;
         within("damping[0]", self.damping[0], S::zero(), S::max_value())?;
         within("damping[1]", self.damping[1], S::zero(), S::max_value())?;

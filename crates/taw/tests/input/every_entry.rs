@@ -5,6 +5,7 @@
 
 #[macro_use]
 mod rows;
+mod body_rows;
 mod joint_rows;
 mod scenes;
 mod sources;

@@ -140,6 +140,7 @@ pub fn rows<S: Scalar>() -> Vec<Row<S>> {
     rows.extend(materials());
     rows.extend(swarms());
     rows.extend(walls().into_iter().chain(super::joint_rows::joints()));
+    rows.extend(super::body_rows::bodies());
     rows.extend(constructors());
     rows.extend(planes_and_frames());
     rows
