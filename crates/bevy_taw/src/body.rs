@@ -201,6 +201,7 @@ type BodyComponents<'a> = (
 );
 
 /// Puts new bodies in, and takes over what somebody else wrote since the last scatter.
+#[allow(clippy::too_many_lines, reason = "to be split: it reads, compares and sets")]
 pub(crate) fn gather(
     mut world: ResMut<TawWorld>,
     mut bodies: Query<BodyComponents>,

@@ -258,6 +258,7 @@ impl TawWorld {
 }
 
 /// Puts new joints in, changes those that were written, and takes the component of those whose ends are gone.
+#[allow(clippy::too_many_lines, reason = "to be split: it reads, compares and sets")]
 pub(crate) fn gather(
     mut world: ResMut<TawWorld>,
     mut joints: Query<(Entity, Ref<Joint>, &mut JointState)>,

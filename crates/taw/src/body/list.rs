@@ -194,7 +194,9 @@ impl<S: Scalar> Bodies<S> {
     /// [`Error::NoSuchBody`], and those of [`Self::insert`].
     pub fn set(&mut self, id: BodyId, body: Body<S>) -> Result<(), Error> {
         let row = self.row(id)?;
-        self.states[row] = BodyState::new(body.validated()?)?;
+        let state = BodyState::new(body.validated()?)?;
+        self.wake_beside(id);
+        self.states[row] = state;
         Ok(())
     }
 

@@ -9,6 +9,7 @@ use super::solve::SubstepParams;
 use super::state::SolverBody;
 use crate::constraint::ContactSoftness;
 use crate::contact::{as_convex, shape_cast};
+use crate::handle::NO_ROW;
 use crate::math::{Point3, Vec3};
 use crate::shape::{BoundedShape, Shape, Sphere};
 
@@ -48,12 +49,21 @@ impl BodySystem {
         for contact in &mut self.contacts {
             contact.forget_impacts(threshold);
         }
+        // Balls have their gravity already.
+        self.accelerate_balls(-h);
         self.bounce();
+        self.accelerate_balls(h);
         for body in &mut self.bodies {
             body.accelerate(h);
         }
         for contact in &mut self.contacts {
             contact.note_approach(&self.bodies);
+        }
+    }
+
+    fn accelerate_balls(&mut self, h: f64) {
+        for ball in self.bodies.iter_mut().filter(|body| body.slot != NO_ROW) {
+            ball.velocity += ball.acceleration * h;
         }
     }
 

@@ -81,7 +81,11 @@ impl<S: Scalar> World<S> {
     /// Remembers contacts, those of sleepers too, which were not looked for.
     fn keep_contacts(&mut self, contacts: Vec<BodyContact>) {
         let before = std::mem::replace(&mut self.bodies.contacts, contacts);
-        let sleeps = |id| self.bodies.row(id).is_ok_and(|row| self.bodies.states[row].asleep);
+        // A kinematic body bears sleepers, too.
+        let sleeps = |id| {
+            let rests = |state: &BodyState<S>| state.asleep || !state.is_dynamic();
+            self.bodies.row(id).is_ok_and(|row| rests(&self.bodies.states[row]))
+        };
         let slept = |contact: &BodyContact| {
             sleeps(contact.key.body)
                 && match contact.key.partner {
@@ -113,7 +117,10 @@ impl<S: Scalar> World<S> {
         let states = &self.bodies.states;
         let gravity = cast_vector::<S, f64>(self.settings.gravity).magnitude();
         let is_fast = |speed: f64, reach: f64| speed > rest::sleep_speed(gravity, reach);
-        let stirs = |state: &BodyState<S>| !state.asleep && is_fast(state.speed(), state.reach);
+        let stirs = |state: &BodyState<S>| {
+            let is_driven = !state.is_dynamic() && state.speed() > 0.0;
+            is_driven || !state.asleep && is_fast(state.speed(), state.reach)
+        };
         let mut bodies = Vec::new();
         if states.iter().any(|state| state.asleep) {
             let tree = BodyCandidate::tree(candidates);

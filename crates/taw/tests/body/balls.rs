@@ -36,6 +36,36 @@ fn a_ball_and_a_box_collide_as_equals() {
     }
 }
 
+/// A ball on a body reaches e² of its height, as on a wall.
+#[test]
+fn a_ball_bounces_off_a_body_to_its_height() {
+    for restitution in [0.5, 0.8, 1.0] {
+        let mut world = world::<f32>(false);
+        let surface = material(0.0, restitution);
+        let floor = Body {
+            mass: taw::body::BodyMass::Uniform(Mass::Infinite),
+            material: surface,
+            ..cuboid([1.0, 0.1, 1.0], point(0.0, -0.1, 0.0))
+        };
+        world.bodies.insert(floor).unwrap();
+        let marble = Marble { material: Some(surface), ..Marble::new(point(0.0, 1.1, 0.0), 0.1) };
+        let marble = world.marbles.insert(marble).unwrap();
+        let (mut peak, mut rising) = (0.0_f64, false);
+        for _ in 0..120 {
+            step(&mut world);
+            let marble = world.marbles.get(marble).unwrap();
+            let rises = marble.velocity.y > 0.0;
+            if rising && !rises {
+                break;
+            }
+            rising = rises;
+            peak = if rises { f64::from(marble.position.y) - 0.1 } else { peak };
+        }
+        let expected = restitution * restitution;
+        assert!((peak / expected - 1.0).abs() < 0.02, "{restitution}: {peak}, not {expected}");
+    }
+}
+
 /// Marbles and balls lie on a box that lies on marbles.
 #[test]
 fn balls_bear_a_box_and_it_bears_balls() {

@@ -109,6 +109,30 @@ fn boxes_ride_on_a_kinematic_body() {
     assert!((place(&world, id).x - 2.0).abs() < 1e-3, "{:?}", place(&world, id));
 }
 
+/// A sleeper falls when the kinematic body under it goes, or is set elsewhere.
+#[test]
+fn sleepers_fall_without_support() {
+    for goes in [false, true] {
+        let mut world = world::<f32>(true);
+        let platform = Body {
+            mass: taw::body::BodyMass::Uniform(Mass::Infinite),
+            ..cuboid([1.0, 0.1, 1.0], point(0.0, 1.0, 0.0))
+        };
+        let id = world.bodies.insert(platform.clone()).unwrap();
+        let cube = world.bodies.insert(cuboid([0.1, 0.1, 0.1], point(0.0, 1.2, 0.0))).unwrap();
+        run(&mut world, 3.0);
+        assert!(world.bodies.is_asleep(cube).unwrap());
+        if goes {
+            world.bodies.remove(id).unwrap();
+        } else {
+            let far = Body { position: point(9.0, 1.0, 0.0), ..platform };
+            world.bodies.set(id, far).unwrap();
+        }
+        run(&mut world, 2.0);
+        assert!(place(&world, cube).y < 0.11, "{:?}", place(&world, cube));
+    }
+}
+
 /// Sleepers wake with what comes, and with what goes.
 #[test]
 fn sleepers_wake() {

@@ -97,6 +97,7 @@ impl<S: Scalar> Swarm<S> {
             return;
         }
         let mut bodies = std::mem::take(&mut self.scratch.bodies);
+        let gravity = cast_vector::<S, f64>(self.gravity.unwrap_or_else(Vec3::zero));
         let rows = self.ids.rows();
         for ball in bodies.bodies.iter_mut().filter(|ball| ball.slot != NO_ROW) {
             let row = rows[ball.slot as usize] as usize;
@@ -111,6 +112,7 @@ impl<S: Scalar> Swarm<S> {
             ball.inverse_inertia = Mat3::from_value(ball.inverse_mass * turns);
             ball.velocity = cast_vector(xyz(&self.velocity[row]));
             ball.spin = cast_vector::<S, f64>(xyz(&self.spin[row])) / radius;
+            ball.acceleration = if inverse_mass > 0.0 { gravity } else { Vec3::zero() };
             // Nor has it any speed.
             if inverse_mass < 0.0 {
                 (ball.velocity, ball.spin) = (Vec3::zero(), Vec3::zero());
