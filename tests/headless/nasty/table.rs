@@ -208,7 +208,12 @@ pub fn samples() -> Vec<Sample> {
         (|it| tinted(it, Tint::Size(0.1, 1.0)), &["Swarm"]),
         (|it| tinted(it, Tint::Plain([0.5; 3])), &["Swarm"]),
     ] as [Sample; 6]);
-    samples.extend([
+    samples.extend(samples_of_bodies());
+    samples
+}
+
+fn samples_of_bodies() -> [Sample; 3] {
+    [
         (
             |it| {
                 let ball = BodyShape::Sphere(Sphere::new(0.5));
@@ -234,6 +239,5 @@ pub fn samples() -> Vec<Sample> {
             },
             OF_JOINTS,
         ),
-    ] as [Sample; 3]);
-    samples
+    ]
 }
