@@ -7,7 +7,7 @@ use super::state::SolverBody;
 use crate::constraint::ContactImpulse;
 use crate::contact::{ContactMaterial, Manifold, ManifoldPoint};
 use crate::frame::Pose;
-use crate::handle::{BodyId, WallId};
+use crate::handle::{BallId, BodyId, WallId};
 use crate::math::Vec3;
 
 /// Partner of a body in a contact, in the order in which contacts are solved: walls last, so that nothing is pushed into
@@ -15,8 +15,8 @@ use crate::math::Vec3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum BodyPartner {
     Body(BodyId),
-    /// Ball of the swarm, by its slot.
-    Ball(u32),
+    /// Ball of the swarm.
+    Ball(BallId),
     Wall(WallId),
 }
 

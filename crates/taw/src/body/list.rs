@@ -1,38 +1,16 @@
 //! Bodies of a world, by handles that stay valid.
 
-use std::sync::Arc;
+use cgmath::{EuclideanSpace, Zero};
 
-use cgmath::{EuclideanSpace, InnerSpace, Zero};
-
+use super::body_state::{BodyState, cast_rotation};
 use super::contact::BodyContact;
-use super::state::SolverBody;
 use super::{Body, BodyId};
 use crate::Error;
-use crate::contact::{Convex, as_convex};
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Pose;
 use crate::handle::Handles;
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector};
-use crate::shape::{Aabb3, BoundedShape, MassProperties, Shape};
-
-/// State of a body.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct BodyState<S> {
-    /// As it was set.
-    pub body: Body<S>,
-    /// Its principal axes in its frame.
-    pub principal: Pose<f64>,
-    /// Its convex parts along its principal axes, about its center of mass.
-    pub parts: Arc<[Shape<f64>]>,
-    pub solver: SolverBody,
-    /// Distance of its surface from its center of mass, at most, in metres.
-    pub reach: f64,
-    /// Force in N and torque in N m in the next step.
-    pub force: [Vec3<f64>; 2],
-    /// Time for which it has been slow, in seconds, and whether it sleeps.
-    pub rest: f64,
-    pub asleep: bool,
-}
+use crate::shape::{Aabb3, MassProperties};
 
 /// Place and motion of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,95 +61,8 @@ pub struct Bodies<S> {
     pub(crate) contacts: Vec<BodyContact>,
     /// Bodies that the last step stopped, since their motion overflowed.
     pub(crate) stopped: Vec<BodyId>,
-}
-
-impl<S: Scalar> BodyState<S> {
-    fn new(body: Body<S>) -> Result<Self, Error> {
-        let properties = body.mass_properties()?.map(|properties| properties.cast::<f64>());
-        let shape = body.shape.cast::<f64>();
-        let principal = properties.map_or_else(
-            || Pose { translation: center_of(&shape), ..Pose::identity() },
-            |of| Pose { rotation: of.axes, translation: of.center.to_vec() },
-        );
-        let shape = shape.transformed(principal.inverse());
-        let parts: Arc<[_]> = match shape {
-            Shape::Compound(compound) => compound.parts().iter().cloned().collect(),
-            simple => [simple].into_iter().collect(),
-        };
-        let solver = SolverBody::rigid(properties.as_ref(), Pose::identity());
-        let reach = parts.iter().map(reach_of).fold(0.0, f64::max);
-        let mut state = Self {
-            principal,
-            parts,
-            solver,
-            reach,
-            force: [Vec3::zero(); 2],
-            rest: 0.0,
-            asleep: false,
-            body,
-        };
-        state.set_pose(Pose {
-            rotation: cast_rotation(state.body.rotation),
-            translation: cast_vector(state.body.position.to_vec()),
-        });
-        state.solver.velocity = cast_vector(state.body.velocity);
-        state.solver.spin = cast_vector(state.body.angular_velocity);
-        Ok(state)
-    }
-
-    /// Places its frame.
-    fn set_pose(&mut self, frame: Pose<f64>) {
-        let frame = Pose { rotation: frame.rotation.normalize(), ..frame };
-        self.solver.set_pose(frame * self.principal);
-    }
-
-    /// Pose of its frame.
-    pub fn pose(&self) -> Pose<f64> {
-        self.solver.pose * self.principal.inverse()
-    }
-
-    /// Its convex part in the world.
-    pub fn part(&self, part: usize) -> Shape<f64> {
-        self.parts[part].transformed(self.solver.pose)
-    }
-
-    /// It in the solver: as an obstacle while it sleeps.
-    pub fn in_solver(&self) -> SolverBody {
-        if self.asleep { self.solver.at_rest() } else { self.solver }
-    }
-
-    /// True if contacts and gravity move it.
-    pub fn is_dynamic(&self) -> bool {
-        self.solver.inverse_mass > 0.0
-    }
-
-    /// Wakes it.
-    pub fn wake(&mut self) {
-        (self.rest, self.asleep) = (0.0, false);
-    }
-
-    /// Speed of its surface, at most, in m/s.
-    pub fn speed(&self) -> f64 {
-        self.solver.velocity.magnitude() + self.solver.spin.magnitude() * self.reach
-    }
-
-    /// Falls asleep.
-    pub fn fall_asleep(&mut self) {
-        self.asleep = true;
-        self.solver.stop();
-    }
-
-    /// Body as it is now.
-    fn now(&self) -> Body<S> {
-        let pose = self.pose();
-        Body {
-            position: Point3::from_vec(cast_vector(pose.translation)),
-            rotation: cast_rotation(pose.rotation),
-            velocity: cast_vector(self.solver.velocity),
-            angular_velocity: cast_vector(self.solver.spin),
-            ..self.body.clone()
-        }
-    }
+    /// Boxes about bodies that were taken out or changed since the last step: what slept on them has to look anew.
+    pub(crate) vacated: Vec<Aabb3<f64>>,
 }
 
 impl<S: Scalar> Bodies<S> {
@@ -196,6 +87,11 @@ impl<S: Scalar> Bodies<S> {
         let row = self.row(id)?;
         let state = BodyState::new(body.validated()?)?;
         self.wake_beside(id);
+        self.vacated.push(self.states[row].bounds());
+        let before = &self.states[row].body;
+        if (&before.shape, before.mass) != (&state.body.shape, state.body.mass) {
+            self.contacts.retain(|contact| !contact.is_of(id)); // their impulses were for another one
+        }
         self.states[row] = state;
         Ok(())
     }
@@ -208,6 +104,7 @@ impl<S: Scalar> Bodies<S> {
         let row = self.row(id)?;
         let body = self.states[row].now();
         self.wake_beside(id);
+        self.vacated.push(self.states[row].bounds());
         self.contacts.retain(|contact| !contact.is_of(id));
         self.handles.swap_remove(id.0);
         self.states.swap_remove(row);
@@ -242,6 +139,7 @@ impl<S: Scalar> Bodies<S> {
         super::place(Point3::from_vec(translation))?;
         self.wake_beside(id);
         let state = &mut self.states[row];
+        self.vacated.push(state.bounds());
         state.wake();
         state.set_pose(Pose {
             rotation: cast_rotation(rotation),
@@ -470,23 +368,4 @@ impl<S: Scalar> Bodies<S> {
             self.wake_island(row);
         }
     }
-}
-
-/// Center of the bounding box of a shape.
-fn center_of(shape: &Shape<f64>) -> Vec3<f64> {
-    shape.bounding_box().center().to_vec()
-}
-
-/// Distance from the origin of a convex shape, at most.
-fn reach_of(shape: &Shape<f64>) -> f64 {
-    if let Some(ball) = as_convex(shape).and_then(Convex::as_sphere) {
-        return ball.center.to_vec().magnitude() + ball.radius;
-    }
-    let Aabb3 { min, max } = shape.bounding_box();
-    let far = |axis: usize| min[axis].abs().max(max[axis].abs());
-    Vec3::new(far(0), far(1), far(2)).magnitude()
-}
-
-fn cast_rotation<S: Scalar, T: Scalar>(Quat { s, v }: Quat<S>) -> Quat<T> {
-    Quat { s: T::from_f64(s.as_f64()), v: cast_vector(v) }
 }

@@ -6,6 +6,7 @@
 //! parts (`contact.rs`), solved as soft contacts in small steps (`solve.rs`; Catto, `Solver2D`, 2024). All numbers of the solver are `f64`, also in
 //! a world of `f32`.
 
+mod body_state;
 mod bounce;
 mod contact;
 mod list;
@@ -19,7 +20,7 @@ pub use list::{Bodies, BodyPlace};
 pub(crate) use contact::{
     BodyContact, BodyContactKey, BodyPartner, SweptManifold, ball_contact, manifold_contact,
 };
-pub(crate) use list::BodyState;
+pub(crate) use body_state::BodyState;
 pub(crate) use state::{SolverBody, turned_freely};
 pub(crate) use system::BodySystem;
 

@@ -4,7 +4,7 @@ use cgmath::{EuclideanSpace, InnerSpace, Matrix, SquareMatrix, Zero};
 
 use crate::frame::Pose;
 use crate::handle::NO_ROW;
-use crate::math::{Mat3, Point3, Quat, Vec3};
+use crate::math::{Mat3, Point3, Quat, Scalar, Vec3};
 use crate::motion::{FreeRotation, WallMotion, integrate_rotation};
 use crate::shape::MassProperties;
 
@@ -215,10 +215,10 @@ impl SolverBody {
         ]
     }
 
-    /// Returns true if all its numbers are finite.
-    pub fn is_finite(&self) -> bool {
+    /// Returns true if all its numbers are finite in a scalar.
+    pub fn is_finite_in<S: Scalar>(&self) -> bool {
         let sum = self.pose.translation + self.velocity + self.spin + self.pose.rotation.v;
-        (sum.x + sum.y + sum.z + self.pose.rotation.s).is_finite()
+        S::from_f64(sum.x + sum.y + sum.z + self.pose.rotation.s).is_finite()
     }
 }
 

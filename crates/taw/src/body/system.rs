@@ -132,13 +132,9 @@ impl BodySystem {
 
     /// Slots of the balls that bodies bear in this substep.
     pub fn borne_balls(&self) -> impl Iterator<Item = u32> + '_ {
-        self.contacts.iter().filter(|contact| contact.presses()).filter_map(|contact| match contact
-            .key
-            .partner
-        {
-            BodyPartner::Ball(slot) => Some(slot),
-            _ => None,
-        })
+        let pressed = self.contacts.iter().filter(|contact| contact.presses());
+        let partners = pressed.map(|contact| self.bodies[contact.bodies[0] as usize].slot);
+        partners.filter(|slot| *slot != NO_ROW)
     }
 
     /// Finds separations and arms where bodies are now.
@@ -156,6 +152,11 @@ impl BodySystem {
 }
 
 impl BodyContact {
+    /// Returns true if it bore something in this step.
+    pub fn bore(&self) -> bool {
+        self.points.iter().any(|point| point.total > 0.0)
+    }
+
     /// Returns true if it bears something in this substep.
     pub fn presses(&self) -> bool {
         self.points.iter().any(|point| point.impulse.normal > 0.0)

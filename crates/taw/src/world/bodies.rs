@@ -3,11 +3,13 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::World;
-use super::body_contacts::BodyCandidate;
+use super::body_contacts::{BodyCandidate, MARGIN, grown};
 use crate::Error;
-use crate::body::{BodyContact, BodyPartner, BodyState, BodySystem};
-use crate::math::{Scalar, UnionFind, Vec3, cast_vector};
+use crate::body::{BodyContact, BodyPartner, BodyState, BodySystem, SolverBody};
+use crate::handle::NO_ROW;
+use crate::math::{Point3, Scalar, UnionFind, Vec3, cast_vector};
 use crate::motion::rest;
+use crate::shape::{Aabb, BoundedShape};
 
 /// Gravity and identity of the walls by which bodies fell asleep, and scratch memory.
 #[derive(Clone, Debug, Default)]
@@ -32,10 +34,12 @@ impl<S: Scalar> World<S> {
     /// Gives bodies and their contacts to the solver for a step of `dt` seconds.
     pub(super) fn give_bodies(&mut self, dt: S) {
         self.bodies.stopped.clear();
+        self.wake_balls_of_vacated_boxes();
         if self.bodies.is_empty() {
             return;
         }
         self.wake_bodies_beside_changes();
+        self.wake_bodies_that_balls_left();
         for id in &self.scratch.soft_step.jointed.rigid {
             if let Ok(row) = self.bodies.row(*id) {
                 self.bodies.states[row].wake(); // what is joined does not sleep
@@ -43,8 +47,11 @@ impl<S: Scalar> World<S> {
         }
         let gravity: Vec3<f64> = cast_vector(self.settings.gravity);
         let step = dt.as_f64();
-        for state in self.bodies.states.iter_mut().filter(|state| state.is_dynamic()) {
+        for state in &mut self.bodies.states {
             let [force, torque] = std::mem::replace(&mut state.force, [Vec3::zero(); 2]);
+            if !state.is_dynamic() {
+                continue;
+            }
             let solver = &mut state.solver;
             solver.acceleration =
                 gravity * state.body.gravity_scale.as_f64() + force * solver.inverse_mass;
@@ -60,22 +67,25 @@ impl<S: Scalar> World<S> {
         if self.bodies.is_empty() {
             return;
         }
-        let BodySystem { bodies, contacts, .. } = self.swarm.take_rigid_bodies();
+        let BodySystem { bodies, mut contacts, .. } = self.swarm.take_rigid_bodies();
         let mut stopped = Vec::new();
         for (row, (state, solver)) in self.bodies.states.iter_mut().zip(&bodies).enumerate() {
             if state.asleep {
                 continue;
             }
-            if solver.is_finite() {
+            if solver.is_finite_in::<S>() {
                 state.solver = *solver;
                 continue;
             }
             state.solver.stop();
             stopped.push(row);
         }
+        let lies = self.bodies_that_lie(&bodies, &contacts);
         self.bodies.stopped = stopped.into_iter().filter_map(|row| self.bodies.id(row)).collect();
+        let stopped = &self.bodies.stopped;
+        contacts.retain(|contact| !stopped.iter().any(|id| contact.is_of(*id)));
         self.keep_contacts(contacts);
-        self.update_body_sleep(dt);
+        self.update_body_sleep(&lies, dt);
     }
 
     /// Remembers contacts, those of sleepers too, which were not looked for.
@@ -90,7 +100,7 @@ impl<S: Scalar> World<S> {
             sleeps(contact.key.body)
                 && match contact.key.partner {
                     BodyPartner::Body(other) => sleeps(other),
-                    BodyPartner::Ball(_) => false,
+                    BodyPartner::Ball(ball) => self.swarm.row(ball).is_ok(),
                     BodyPartner::Wall(wall) => self.walls.row(wall).is_ok(),
                 }
         };
@@ -148,16 +158,75 @@ impl<S: Scalar> World<S> {
         any
     }
 
-    /// Lets islands of bodies that have all rested long enough fall asleep.
-    fn update_body_sleep(&mut self, dt: S) {
+    /// Wakes the balls that were near bodies that were taken out or changed.
+    fn wake_balls_of_vacated_boxes(&mut self) {
+        let vacated = std::mem::take(&mut self.bodies.vacated);
+        if vacated.is_empty() {
+            return;
+        }
+        let mut balls = Vec::new();
+        self.swarm.visit_balls(|ball| {
+            let center = Aabb { min: ball.center(), max: ball.center() };
+            let bounds = grown(&center, ball.radius() * (1.0 + MARGIN));
+            if ball.is_asleep && vacated.iter().any(|left| left.overlaps(&bounds)) {
+                balls.push(ball.row);
+            }
+        });
+        for row in balls {
+            self.swarm.wake_row(row);
+        }
+    }
+
+    /// Wakes bodies that slept on balls which were taken out or moved away.
+    fn wake_bodies_that_balls_left(&mut self) {
+        let left = |contact: &&BodyContact| {
+            let BodyPartner::Ball(ball) = contact.key.partner else { return false };
+            let Ok(body) = self.bodies.row(contact.key.body) else { return false };
+            let state = &self.bodies.states[body];
+            if !state.asleep || !contact.presses() {
+                return false;
+            }
+            let Ok(row) = self.swarm.row(ball) else { return true };
+            let [x, y, z, radius] = self.swarm.balls()[row].map(S::as_f64);
+            let local = state.solver.pose.inverse_transform_point(Point3::new(x, y, z));
+            let part = &state.parts[contact.key.parts[1] as usize];
+            part.project_point(local).distance > radius * (1.0 + MARGIN)
+        };
+        let left: Vec<_> = self.bodies.contacts.iter().filter(left).map(|it| it.key.body).collect();
+        for row in left.into_iter().filter_map(|id| self.bodies.row(id).ok()).collect::<Vec<_>>() {
+            self.bodies.wake_island(row);
+        }
+    }
+
+    /// True for each body that lies on something, and on nothing that drives it: a wall or a kinematic body that
+    /// moves, or a surface that does.
+    fn bodies_that_lie(&self, solver: &[SolverBody], contacts: &[BodyContact]) -> Vec<bool> {
+        let mut lies = vec![false; self.bodies.len()];
+        let mut is_driven = vec![false; self.bodies.len()];
+        for contact in contacts.iter().filter(|contact| contact.bore()) {
+            let ends = contact.bodies.map(|body| body as usize);
+            for (body, other) in [(ends[0], ends[1]), (ends[1], ends[0])] {
+                if body < lies.len() {
+                    let other = &solver[other];
+                    let moves = !other.velocity.is_zero() || !other.spin.is_zero();
+                    lies[body] = true;
+                    is_driven[body] |=
+                        other.slot == NO_ROW && other.inverse_mass == 0.0 && moves;
+                }
+            }
+        }
+        lies.iter().zip(is_driven).map(|(lies, is_driven)| *lies && !is_driven).collect()
+    }
+
+    /// Lets islands of bodies that have all rested long enough fall asleep. `lies` says which lie on something.
+    fn update_body_sleep(&mut self, lies: &[bool], dt: S) {
         let gravity = cast_vector::<S, f64>(self.settings.gravity).magnitude();
         let sleeps = self.swarm.model().sleeps;
-        for state in &mut self.bodies.states {
-            let square = state.solver.velocity.magnitude2()
-                + state.solver.spin.magnitude2() * state.reach * state.reach;
-            let rests = rest::is_slow(square, gravity, state.reach);
+        for (state, lies) in self.bodies.states.iter_mut().zip(lies) {
             let may = sleeps && !state.body.sleeping_disabled && state.is_dynamic();
-            state.rest = if rests && may { state.rest + dt.as_f64() } else { 0.0 };
+            if !state.asleep {
+                state.pass_rest(gravity, *lies && may, dt.as_f64());
+            }
         }
         let (states, islands) = (&self.bodies.states, &mut self.scratch.bodies.islands);
         islands.reset(states.len());
@@ -171,10 +240,9 @@ impl<S: Scalar> World<S> {
             }
         }
         let mut restless = vec![false; states.len()];
-        let lasts = |state: &BodyState<S>| rest::lasts(state.rest, state.reach, gravity);
         let of_row: Vec<_> = (0..states.len()).map(|row| islands.set_of(row) as usize).collect();
         for (state, island) in states.iter().zip(&of_row) {
-            restless[*island] |= !state.asleep && !lasts(state);
+            restless[*island] |= !state.asleep && !state.may_sleep(gravity);
         }
         for (state, island) in self.bodies.states.iter_mut().zip(&of_row) {
             if state.is_dynamic() && !restless[*island] && !state.asleep {

@@ -21,7 +21,7 @@ use crate::shape::{Aabb, Aabb3, BoundedShape, Bvh};
 use crate::swarm::BallView;
 
 /// Margin beyond the motion of a step within which contacts are listed, over the reach of the smaller body.
-const MARGIN: f64 = 0.02;
+pub(super) const MARGIN: f64 = 0.02;
 /// Distance from another wall within which a point counts as on it, over the reach of the body.
 const FLUSH: f64 = 0.01;
 
@@ -54,15 +54,18 @@ impl BodyCandidate {
         let margin = if state.asleep { 0.0 } else { speed * dt + turn };
         let slack = MARGIN * state.reach;
         let margin = margin + slack;
-        let boxes = (0..state.parts.len()).map(|part| state.part(part).bounding_box());
-        let none = Aabb { min: state.solver.center(), max: state.solver.center() };
-        let bounds = boxes.reduce(|all, next| all.union(&next)).unwrap_or(none);
-        Self { row, margin, slack, bounds: grown(&bounds, margin) }
+        Self { row, margin, slack, bounds: grown(&state.bounds(), margin) }
     }
 }
 
+/// Way of the points of a wall within this distance of its pivot in `dt` seconds, at most, in metres.
+fn way_of_wall(motion: &WallMotion<f64>, distance: f64, dt: f64) -> f64 {
+    let turn = (motion.angular_velocity.magnitude() * dt).min(std::f64::consts::PI);
+    motion.velocity.magnitude() * dt + turn * distance
+}
+
 /// Box with this much more on each side.
-fn grown(bounds: &Aabb3<f64>, by: f64) -> Aabb3<f64> {
+pub(super) fn grown(bounds: &Aabb3<f64>, by: f64) -> Aabb3<f64> {
     let by = Vec3::new(by, by, by);
     Aabb { min: bounds.min - by, max: bounds.max + by }
 }
@@ -101,6 +104,7 @@ impl<S: Scalar> World<S> {
         system: &mut BodySystem,
     ) {
         let mut index_of_wall = BTreeMap::new();
+        let farthest = self.farthest_wall_way(dt);
         for candidate in candidates {
             let state = &self.bodies.states[candidate.row];
             if state.asleep || !state.is_dynamic() {
@@ -117,6 +121,15 @@ impl<S: Scalar> World<S> {
                 max: cast_point(candidate.bounds.max),
             };
             self.walls.for_each_colliding(&bounds, filter, |part| near.push(part));
+            if farthest > 0.0 {
+                let beyond = grown(&candidate.bounds, farthest);
+                let bounds = Aabb { min: cast_point(beyond.min), max: cast_point(beyond.max) };
+                self.walls.for_each_colliding(&bounds, filter, |part| {
+                    if self.walls.has_moved(part.wall as usize) {
+                        near.push(part);
+                    }
+                });
+            }
             near.sort_unstable();
             near.dedup();
             let first = system.contacts.len();
@@ -136,6 +149,18 @@ impl<S: Scalar> World<S> {
             }
             drop_ghosts(&mut system.contacts, first, &colliders, state.reach * FLUSH);
         }
+    }
+
+    /// Longest way of a point of a wall that moves, in a step of `dt` seconds, at most; in metres.
+    fn farthest_wall_way(&self, dt: f64) -> f64 {
+        let rows = 0..self.walls.len();
+        let ways = rows.filter(|row| self.walls.has_moved(*row)).filter_map(|row| {
+            let motion = self.walls.motion_of_row(row)?;
+            let bounds = self.walls.shapes()[row].bounding_box()?;
+            let reach = [bounds.min, bounds.max].map(|at| (at - motion.pivot).magnitude().as_f64());
+            Some(way_of_wall(&motion.cast(), 2.0 * reach[0].max(reach[1]), dt))
+        });
+        ways.fold(0.0, f64::max)
     }
 
     /// Part of a wall where it is when a step of `dt` seconds begins.
@@ -165,11 +190,18 @@ impl<S: Scalar> World<S> {
             return Vec::new();
         };
         let material = state.body.material.on_wall(self.walls.material_of_row(row)).cast();
+        let motion = self.walls.motion_of_row(row).filter(|_| self.walls.has_moved(row));
+        let way = motion.map_or(0.0, |motion| {
+            let motion = motion.cast::<f64>();
+            let arm = (state.solver.center() - motion.pivot).magnitude() + state.reach;
+            way_of_wall(&motion, arm, dt)
+        });
+        let margin = candidate.margin + way;
         let of_part = |at: usize| {
             let bodies = [wall, candidate.row as u32];
             let ends = bodies.map(|body| &system.bodies[body as usize]);
             let shape = WallCollider::Solid(state.part(at));
-            let reach = ContactReach { margin: candidate.margin, slack: candidate.slack, dt };
+            let reach = ContactReach { margin, slack: candidate.slack, dt };
             let found = swept_manifold([collider, &shape], ends, reach)?;
             let key = BodyContactKey {
                 partner: BodyPartner::Wall(id),
@@ -298,7 +330,7 @@ impl<S: Scalar> World<S> {
                 }
                 let bodies = [(system.bodies.len() - 1) as u32, row as u32];
                 let key = BodyContactKey {
-                    partner: BodyPartner::Ball(ball.slot),
+                    partner: BodyPartner::Ball(ball.id),
                     body,
                     parts: [0, part],
                 };

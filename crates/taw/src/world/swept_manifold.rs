@@ -26,7 +26,11 @@ pub(super) fn swept_manifold(
     ends: [&SolverBody; 2],
     ContactReach { margin, slack, dt }: ContactReach,
 ) -> Option<SweptManifold> {
-    let ends = ends.map(|end| *end);
+    // As fast as they are in its middle.
+    let ends = ends.map(|end| SolverBody {
+        velocity: end.velocity + end.acceleration * (0.5 * dt),
+        ..*end
+    });
     let (found, radii) = manifold_of(colliders, margin)?;
     let is_near = found.points.iter().any(|point| point.distance <= slack);
     let is_plane = matches!(colliders[0], WallCollider::Plane { .. });

@@ -5,6 +5,7 @@ mod flight;
 mod joined;
 mod piles;
 mod random;
+mod sleep;
 mod sliding;
 
 use taw::body::{Body, BodyId};

@@ -5,7 +5,7 @@ use cgmath::{SquareMatrix, Zero};
 use crate::body::BodySystem;
 use crate::broad::CollisionLayers;
 use crate::constraint::ContactSoftness;
-use crate::handle::NO_ROW;
+use crate::handle::{BallId, NO_ROW};
 use crate::math::{Mat3, Point3, Row, Scalar, Vec3, cast_vector};
 use crate::motion::BALL_INVERSE_INERTIA;
 use crate::response::Material;
@@ -16,6 +16,7 @@ use crate::swarm::wall_contact::xyz;
 
 /// Ball that a rigid body may touch.
 pub(crate) struct BallView<S> {
+    pub id: BallId,
     pub slot: u32,
     pub row: usize,
     /// Center and radius, in metres.
@@ -43,7 +44,9 @@ impl<S: Scalar> Swarm<S> {
         let slots = self.ids.slots();
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
         for (row, (at, velocity)) in self.at.iter().zip(&self.velocity).enumerate() {
+            let Some(id) = self.id(row) else { continue };
             visit(BallView {
+                id,
                 slot: slots[row],
                 row,
                 at: *at,
