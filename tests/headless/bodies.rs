@@ -1,7 +1,10 @@
 //! Rigid bodies and joints as components.
 
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
+use bevy_taw::refusal::InputRefused;
+use bevy_taw::snapshot::RowRemoved;
 
 use crate::scene;
 
@@ -131,4 +134,138 @@ fn other_responses_leave_bodies_out_by_name_and_take_them_in_again() {
     app.insert_resource(TawModel(Model::GAME));
     scene::frames(&mut app, 128);
     assert!((transform(&app, body).translation.y - 0.2).abs() < 2e-3);
+}
+
+/// Bodies and joints go on from where they were; those that came since stay, and those that went are told.
+#[test]
+fn a_restored_world_has_its_bodies_and_joints_again() {
+    let mut app = app();
+    let boxes = [0.0, 0.25].map(|height| {
+        let at = Transform::from_xyz(0.1 * height, 1.0 + height, 0.0);
+        app.world_mut().spawn((Body::from(Cuboid::new(0.4, 0.2, 0.4)), at)).id()
+    });
+    let bob = (Body::from(Sphere::new(0.1)), Transform::from_xyz(3.5, 2.0, 0.0));
+    let bob = app.world_mut().spawn(bob).id();
+    let rope = JointKind::Distance([0.0, 0.5]);
+    let rope =
+        Joint::new(rope, JointEnd::world(Vec3::new(3.0, 2.0, 0.0)), JointEnd::on(bob, Vec3::ZERO));
+    let rope = app.world_mut().spawn(rope).id();
+    scene::frames(&mut app, 20);
+    let saved = app.world().resource::<TawWorld>().snapshot();
+    let places = |app: &App| [boxes[0], boxes[1], bob].map(|it| transform(app, it));
+    scene::frames(&mut app, 60);
+    let first = places(&app);
+    scene::frames(&mut app, 77);
+    for _ in 0..2 {
+        app.world_mut().resource_mut::<TawWorld>().restore(&saved);
+        scene::frames(&mut app, 60);
+        assert_eq!(places(&app), first);
+        assert!(app.world().resource::<Messages<RowRemoved>>().is_empty());
+    }
+    let at = Transform::from_xyz(-3.0, 0.1, 0.0);
+    let late = app.world_mut().spawn((Body::from(Cuboid::new(0.4, 0.2, 0.4)), at)).id();
+    app.world_mut().despawn(rope);
+    app.world_mut().despawn(boxes[1]);
+    scene::frames(&mut app, 10);
+    app.world_mut().resource_mut::<TawWorld>().restore(&saved);
+    app.update();
+    let told = app.world().resource::<Messages<RowRemoved>>();
+    let told: Vec<_> = told.iter_current_update_messages().copied().collect();
+    assert!(matches!(told[..], [RowRemoved::Body(_), RowRemoved::Joint(_)]), "{told:?}");
+    scene::frames(&mut app, 60);
+    let world = app.world().resource::<TawWorld>();
+    assert_eq!((world.bodies.len(), world.joints.len()), (3, 0));
+    assert!(transform(&app, bob).translation.y < 0.2, "its rope is gone");
+    assert!((transform(&app, late).translation - at.translation).length() < 2e-3);
+}
+
+/// A body whose entity is disabled is out of the world, and so are its joints, until it comes back as it was.
+#[test]
+fn a_disabled_body_is_away_with_its_joints() {
+    let mut app = app();
+    app.insert_resource(Gravity(Vec3::ZERO));
+    let flyer = (Body::from(Cuboid::new(0.4, 0.2, 0.6)), Transform::from_xyz(0.0, 5.0, 0.0));
+    let flyer = app.world_mut().spawn(flyer).id();
+    let push = ExternalImpulse { impulse: Vec3::X * 120.0, angular: Vec3::ZERO };
+    app.world_mut().entity_mut(flyer).insert((MarbleMass::Kilograms(120.0), push));
+    let partner = (Body::from(Sphere::new(0.1)), Transform::from_xyz(0.0, 8.0, 0.0));
+    let partner = app.world_mut().spawn(partner).id();
+    let string = Joint::new(
+        JointKind::Distance([0.0, 100.0]),
+        JointEnd::on(flyer, Vec3::ZERO),
+        JointEnd::on(partner, Vec3::ZERO),
+    );
+    let string = app.world_mut().spawn(string).id();
+    scene::frames(&mut app, 16);
+    let before = transform(&app, flyer).translation.x;
+    app.world_mut().entity_mut(flyer).insert(Disabled);
+    scene::frames(&mut app, 16);
+    let count = |app: &App| {
+        let world = app.world().resource::<TawWorld>();
+        (world.bodies.len(), world.joints.len())
+    };
+    assert_eq!(count(&app), (1, 0));
+    // A joint that is written meanwhile waits for its end.
+    app.world_mut().get_mut::<Joint>(string).unwrap().kind = JointKind::Distance([0.0, 90.0]);
+    app.insert_resource(TawModel(Model { response: Response::Impulse, ..Model::GAME }));
+    scene::frames(&mut app, 4);
+    assert!(
+        app.world().resource::<Messages<InputRefused>>().iter_current_update_messages().count() < 2
+    );
+    app.insert_resource(TawModel(Model::GAME));
+    scene::frames(&mut app, 4);
+    app.world_mut().entity_mut(flyer).remove::<Disabled>();
+    scene::frames(&mut app, 16);
+    assert_eq!(count(&app), (2, 1));
+    assert!(app.world().entity(string).contains::<Joint>());
+    let way = transform(&app, flyer).translation.x - before;
+    assert!((way - 0.25).abs() < 1e-3, "{way}");
+    app.world_mut().entity_mut(string).insert(Disabled);
+    scene::frames(&mut app, 2);
+    assert_eq!(count(&app), (2, 0));
+    app.world_mut().entity_mut(flyer).insert(Disabled);
+    app.world_mut().despawn(flyer);
+    scene::frames(&mut app, 2);
+    assert_eq!(count(&app), (1, 0));
+    assert!(!app.world().entity(string).contains::<Joint>(), "its end is gone");
+}
+
+/// A crate on a tray that carries it along is drawn where it is, whatever its parent does between two steps.
+#[test]
+fn a_child_body_stays_where_it_is_while_its_parent_moves() {
+    let mut app = app();
+    let parent = app.world_mut().spawn(Transform::from_xyz(1.0, 0.0, 0.0)).id();
+    let at = Transform::from_xyz(-1.0, 0.1, 0.0);
+    let child = (Body::from(Cuboid::new(0.4, 0.2, 0.6)), at, ChildOf(parent));
+    let child = app.world_mut().spawn(child).id();
+    scene::frames(&mut app, 4);
+    for step in 0..8 {
+        app.world_mut().get_mut::<Transform>(parent).unwrap().translation.x += 0.3;
+        scene::frames(&mut app, 1);
+        let place = app.world().get::<GlobalTransform>(child).unwrap().translation();
+        assert!((place - Vec3::Y * 0.1).length() < 2e-3, "{step}: {place}");
+    }
+}
+
+/// A hinge tells its angle.
+#[test]
+fn a_hinge_driven_to_an_angle_tells_it() {
+    let mut app = app();
+    app.insert_resource(Gravity(Vec3::ZERO));
+    let arm = (Body::from(Cuboid::new(1.0, 0.1, 0.1)), Transform::from_xyz(0.5, 3.0, 0.0));
+    let arm = app.world_mut().spawn(arm).id();
+    let spring = JointSpring { frequency: 4.0, damping_ratio: 1.0 };
+    let motor = Some(JointMotor::Position { target: 0.7, spring, max: 1e4 });
+    let hinge = Joint::new(
+        JointKind::Hinge(JointDrive { limits: None, motor }),
+        JointEnd::world(Vec3::Y * 3.0),
+        JointEnd::on(arm, Vec3::X * -0.5),
+    );
+    let hinge = app.world_mut().spawn(hinge).id();
+    scene::frames(&mut app, 128);
+    let world = app.world().resource::<TawWorld>();
+    let angle = world.joints.position(world.joint_id(hinge).unwrap()).unwrap().unwrap();
+    assert!((angle - 0.7).abs() < 1e-3, "{angle}");
+    let drawn = transform(&app, arm).rotation.angle_between(Quat::from_rotation_z(0.7));
+    assert!(drawn < 1e-3, "{drawn}");
 }

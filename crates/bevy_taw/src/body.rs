@@ -1,6 +1,9 @@
 //! Rigid bodies: boxes, capsules, hulls and compounds that move and turn.
 
+use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::query::QueryData;
 use bevy::ecs::world::DeferredWorld;
+use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use taw::body as core;
 use taw::body::BodyId;
@@ -13,9 +16,10 @@ use crate::components::{
 };
 use crate::convert::{from_point, from_rotation, from_vector, to_point, to_rotation, to_vector};
 use crate::layers::CollisionLayers;
-use crate::refusal::Refusals;
+use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
 use crate::scatter::Frame;
+use crate::snapshot::RowRemoved;
 
 /// Rigid body: a solid of any shape that moves, turns and collides.
 ///
@@ -156,12 +160,14 @@ impl TawWorld {
 /// State of a body entity in the physics.
 #[derive(Component, Clone, Debug, Default)]
 pub(crate) struct BodyState {
-    /// `None` before the first gather, and when the input was refused.
+    /// `None` before the first gather, while it is out of the world, and when the input was refused.
     pub id: Option<BodyId>,
     /// Components as gather or scatter last left them.
     seen: SeenBody,
     /// True if they could be no body: that is tried again when they change.
     refused: bool,
+    /// Body as it left the world, for when it comes back: its entity is disabled, or the response knows none.
+    away: Option<Box<core::Body<f32>>>,
 }
 
 /// Components of a body to the bit, so that even a NaN is seen only once.
@@ -182,52 +188,37 @@ struct Settings {
     sleeping_disabled: bool,
 }
 
-/// Components of a body entity.
-type BodyComponents<'a> = (
-    Entity,
-    Ref<'a, Body>,
-    &'a Transform,
-    Option<&'a ChildOf>,
-    (Option<&'a Velocity>, Option<&'a AngularVelocity>),
-    (
-        Option<&'a MarbleMass>,
-        Option<&'a GravityScale>,
-        Option<&'a MarbleDamping>,
-        Option<&'a SurfaceMaterial>,
-        Option<&'a CollisionLayers>,
-        Has<SleepingDisabled>,
-    ),
-    &'a mut BodyState,
+/// Optional components of a body that are settings.
+type BodySettings<'a> = (
+    Option<&'a MarbleMass>,
+    Option<&'a GravityScale>,
+    Option<&'a MarbleDamping>,
+    Option<&'a SurfaceMaterial>,
+    Option<&'a CollisionLayers>,
+    Has<SleepingDisabled>,
 );
 
-/// Puts new bodies in, and takes over what somebody else wrote since the last scatter.
-#[allow(clippy::too_many_lines, reason = "to be split: it reads, compares and sets")]
-pub(crate) fn gather(
-    mut world: ResMut<TawWorld>,
-    mut bodies: Query<BodyComponents>,
-    transforms: TransformHelper,
-    mut refusals: Refusals,
-    mut was_known: Local<bool>,
-) {
-    let is_known = world.model().response.knows_bodies();
-    let again = !std::mem::replace(&mut *was_known, is_known) && is_known;
-    for (entity, body, transform, parent, (velocity, spin), settings, mut state) in &mut bodies {
-        if !is_known {
-            if let Some(id) = state.id.take() {
-                let _ = world.bodies.remove(id); // or the game took it out by itself
-                world.body_entities.remove(&id);
-            }
-            if !std::mem::replace(&mut state.refused, true) {
-                let response = "a response other than SoftStep";
-                let error = taw::Error::Unsupported { response, feature: "rigid bodies" };
-                refusals.check(Some(entity), Err::<(), _>(error));
-            }
-            continue;
-        }
-        let (mass, gravity_scale, damping, material, layers, sleeping_disabled) = settings;
-        let seen = SeenBody {
-            place: (bits(transform.translation), rotation_bits(transform.rotation)),
-            velocity: [velocity.map(|v| bits(**v)), spin.map(|s| bits(**s))],
+/// Components of a body entity.
+#[derive(QueryData)]
+#[query_data(mutable)]
+pub(crate) struct BodyComponents {
+    entity: Entity,
+    body: Ref<'static, Body>,
+    transform: &'static Transform,
+    is_child: Has<ChildOf>,
+    velocity: Option<&'static Velocity>,
+    spin: Option<&'static AngularVelocity>,
+    settings: BodySettings<'static>,
+    is_disabled: Has<Disabled>,
+    state: &'static mut BodyState,
+}
+
+impl BodyComponentsItem<'_, '_> {
+    fn seen(&self) -> SeenBody {
+        let (mass, gravity_scale, damping, material, layers, sleeping_disabled) = self.settings;
+        SeenBody {
+            place: (bits(self.transform.translation), rotation_bits(self.transform.rotation)),
+            velocity: [self.velocity.map(|v| bits(**v)), self.spin.map(|spin| bits(**spin))],
             settings: Settings {
                 mass: mass.map(|mass| mass.bits()),
                 gravity_scale: gravity_scale.map(|scale| scale.to_bits()),
@@ -236,56 +227,164 @@ pub(crate) fn gather(
                 layers: layers.copied().unwrap_or_default(),
                 sleeping_disabled,
             },
+        }
+    }
+
+    /// Writes the shape and the settings to a body.
+    fn set(&self, body: &mut core::Body<f32>) -> Result<(), taw::Error> {
+        let (mass, gravity_scale, damping, material, layers, sleeping_disabled) = self.settings;
+        body.shape = self.body.shape()?;
+        body.mass = core::BodyMass::Uniform(mass.copied().unwrap_or_default().into());
+        body.gravity_scale = *gravity_scale.copied().unwrap_or_default();
+        body.damping = damping.map_or([0.0; 2], |d| [d.linear, d.angular]);
+        body.material = material.map(|m| (*m).into()).unwrap_or_default();
+        body.layers = layers.copied().unwrap_or_default().into();
+        body.sleeping_disabled = sleeping_disabled;
+        Ok(())
+    }
+
+    /// Takes the body out of the world until it comes back.
+    fn leave(&mut self, world: &mut TawWorld) {
+        if let Some(id) = self.state.id.take() {
+            world.body_entities.remove(&id);
+            // It can only be gone already if the game took it out by itself.
+            self.state.away = world.bodies.remove(id).ok().map(Box::new);
+        }
+    }
+
+    /// Puts a body in, or takes over what somebody wrote; of one in a restored world, `all` that is set.
+    fn take_over(
+        &mut self,
+        world: &mut TawWorld,
+        (place, rotation): (Vec3, Quat),
+        (last, seen): (&SeenBody, &SeenBody),
+        all: bool,
+    ) -> Result<BodyId, taw::Error> {
+        let id = self.state.id;
+        let is_new = id.is_none() && self.state.away.is_none();
+        let was_placed = is_new || last.place != seen.place;
+        let was_pushed = is_new || last.velocity != seen.velocity;
+        if let Some(id) = id
+            && !all
+            && last.settings == seen.settings
+            && !self.body.is_changed()
+        {
+            if was_placed {
+                world.bodies.set_pose(id, pose(place, rotation))?;
+            }
+            if was_pushed {
+                let now = world.bodies.motion(id)?;
+                let velocity = self.velocity.map_or(now.velocity, |v| to_vector(**v));
+                let spin = self.spin.map_or(now.angular_velocity, |spin| to_vector(**spin));
+                world.bodies.set_velocity(id, velocity, spin)?;
+            }
+            return Ok(id);
+        }
+        let before = match (id, &self.state.away) {
+            (Some(id), _) => world.bodies.get(id)?,
+            (None, Some(away)) => (**away).clone(),
+            (None, None) => core::Body::cuboid(to_vector(Vec3::ONE), to_point(place)),
         };
-        state.refused &= !again;
-        let id = state.id.filter(|id| world.bodies.pose(*id).is_ok());
-        let last = std::mem::replace(&mut state.seen, seen);
-        if (id.is_some() || state.refused) && last == seen && !body.is_changed() {
+        let mut now = before.clone();
+        self.set(&mut now)?;
+        if was_placed {
+            (now.position, now.rotation) = (to_point(place), to_rotation(rotation));
+        }
+        if let Some(velocity) = self.velocity.filter(|_| was_pushed) {
+            now.velocity = to_vector(**velocity);
+        }
+        if let Some(spin) = self.spin.filter(|_| was_pushed) {
+            now.angular_velocity = to_vector(**spin);
+        }
+        match id {
+            Some(id) if now == before => Ok(id),
+            Some(id) => world.bodies.set(id, now).map(|()| id),
+            None => world.bodies.insert(now),
+        }
+    }
+}
+
+/// Run condition: there are bodies, also disabled ones.
+pub(crate) fn any(bodies: Query<(), (With<Body>, Allow<Disabled>)>) -> bool {
+    !bodies.is_empty()
+}
+
+/// Puts new bodies in, and takes over what somebody else wrote since the last scatter.
+pub(crate) fn gather(
+    mut world: ResMut<TawWorld>,
+    mut bodies: Query<BodyComponents, Allow<Disabled>>,
+    transforms: TransformHelper,
+    (mut refusals, mut commands): (Refusals, Commands),
+    mut was_known: Local<bool>,
+) {
+    let is_known = world.model().response.knows_bodies();
+    let again = !std::mem::replace(&mut *was_known, is_known) && is_known;
+    let restored = world.just_restored;
+    for mut it in &mut bodies {
+        let entity = it.entity;
+        if !is_known || it.is_disabled {
+            let was_in = it.state.id.is_some();
+            it.leave(&mut world);
+            if was_in {
+                commands.entity(entity).try_remove::<Sleeping>(); // what is away is awake when it comes back
+            }
+            if !is_known && !it.is_disabled {
+                let response = "a response other than SoftStep";
+                let error = taw::Error::Unsupported { response, feature: "rigid bodies" };
+                refusals.check(Some(entity), Err::<(), _>(error));
+            }
             continue;
         }
-        let is_new = id.is_none();
-        let (place, rotation) = match parent {
-            None => (transform.translation, transform.rotation),
-            Some(_) => match transforms.compute_global_transform(entity) {
-                Ok(global) => (global.translation(), global.rotation()),
-                Err(_) => continue, // it has no parent's place
-            },
-        };
-        let set = |world: &mut TawWorld| {
-            let shape = body.shape()?;
-            let mut now = match id {
-                Some(id) => core::Body { shape, ..world.bodies.get(id)? },
-                None => core::Body::new(shape, to_point(place)),
+        let seen = it.seen();
+        it.state.refused &= !again;
+        it.state.id = it.state.id.filter(|id| world.bodies.motion(*id).is_ok());
+        let last = std::mem::replace(&mut it.state.seen, seen);
+        let is_settled = it.state.id.is_some() || it.state.refused && !it.is_child;
+        if is_settled && last == seen && !it.body.is_changed() && !restored {
+            continue;
+        }
+        let place = if it.is_child {
+            let global = transforms.compute_global_transform(entity);
+            let Ok(global) = global else {
+                refusals.check(Some(entity), Err(Refusal::NoPlace));
+                continue;
             };
-            if is_new || last.place != seen.place {
-                (now.position, now.rotation) = (to_point(place), to_rotation(rotation));
-            }
-            if let Some(velocity) = velocity.filter(|_| is_new || last.velocity != seen.velocity) {
-                now.velocity = to_vector(**velocity);
-            }
-            if let Some(spin) = spin.filter(|_| is_new || last.velocity != seen.velocity) {
-                now.angular_velocity = to_vector(**spin);
-            }
-            let mass = mass.copied().unwrap_or_default();
-            now.mass = core::BodyMass::Uniform(mass.into());
-            now.gravity_scale = *gravity_scale.copied().unwrap_or_default();
-            now.damping = damping.map_or([0.0; 2], |d| [d.linear, d.angular]);
-            now.material = material.map(|m| (*m).into()).unwrap_or_default();
-            now.layers = layers.copied().unwrap_or_default().into();
-            now.sleeping_disabled = sleeping_disabled;
-            match id {
-                Some(id) => world.bodies.set(id, now).map(|()| id),
-                None => world.bodies.insert(now),
-            }
+            (global.translation(), global.rotation())
+        } else {
+            (it.transform.translation, it.transform.rotation)
         };
-        match set(&mut world) {
+        match it.take_over(&mut world, place, (&last, &seen), restored) {
             Ok(id) => {
-                (state.id, state.refused) = (Some(id), false);
+                (it.state.id, it.state.refused, it.state.away) = (Some(id), false, None);
                 world.body_entities.insert(id, entity);
             }
             Err(error) => {
-                state.refused = true;
+                it.state.refused = true;
                 refusals.check(Some(entity), Err::<(), _>(error));
+            }
+        }
+    }
+}
+
+/// Gives body entities the rows that they have in a restored world, and takes out those that no entity stands behind.
+pub(crate) fn name(
+    mut world: ResMut<TawWorld>,
+    mut bodies: Query<&mut BodyState, Allow<Disabled>>,
+    mut removed: MessageWriter<RowRemoved>,
+) {
+    for mut state in &mut bodies {
+        (state.id, state.refused) = (None, false);
+    }
+    let known: Vec<_> = world.body_entities.iter().map(|(id, entity)| (*id, *entity)).collect();
+    for (id, entity) in known {
+        match bodies.get_mut(entity) {
+            Ok(mut state) => (state.id, state.away) = (Some(id), None),
+            Err(_) => {
+                world.body_entities.remove(&id);
+                if world.bodies.remove(id).is_ok() {
+                    log::warn!("taw took out {id:?}: no entity stands behind it");
+                    removed.write(RowRemoved::Body(id));
+                }
             }
         }
     }
@@ -325,6 +424,34 @@ type MovedBody<'a> = (
     &'a mut BodyState,
 );
 
+/// Children with the frames of their parents; none where there is no way back from a scale of zero.
+fn frames_of(
+    children: &Query<(Entity, &ChildOf), With<Body>>,
+    helper: &TransformHelper,
+) -> HashMap<Entity, Option<Frame>> {
+    let frames = children.iter().filter_map(|(entity, child_of)| {
+        let parent = helper.compute_global_transform(child_of.parent()).ok()?;
+        Some((entity, Frame::new(&parent)))
+    });
+    frames.collect()
+}
+
+/// Writes the place of a body to its `Transform`, and notes it as seen.
+fn put(
+    motion: &core::BodyPlace<f32>,
+    frame: &Frame,
+    transform: &mut Mut<Transform>,
+    state: &mut Mut<BodyState>,
+) {
+    let place = frame.local(from_point(motion.position));
+    let rotation = frame.turned(from_rotation(motion.rotation));
+    let now = (bits(place), rotation_bits(rotation));
+    if now != (bits(transform.translation), rotation_bits(transform.rotation)) {
+        (transform.translation, transform.rotation) = (place, rotation);
+    }
+    state.seen.place = now;
+}
+
 /// Writes `Transform`, `Velocity` and `AngularVelocity` of the bodies that moved, and who sleeps.
 pub(crate) fn scatter(
     world: Res<TawWorld>,
@@ -332,28 +459,15 @@ pub(crate) fn scatter(
     children: Query<(Entity, &ChildOf), With<Body>>,
     mut commands: Commands,
 ) {
-    let helper = transforms.p0();
-    let frames: Vec<_> = children
-        .iter()
-        .filter_map(|(entity, child_of)| {
-            let parent = helper.compute_global_transform(child_of.parent()).ok()?;
-            Some((entity, Frame::new(&parent)))
-        })
-        .collect();
+    let frames = frames_of(&children, &transforms.p0());
     for (entity, mut transform, velocity, spin, sleeping, mut state) in &mut transforms.p1() {
         let Some(body) = state.id.and_then(|id| world.bodies.motion(id).ok()) else { continue };
-        let frame = match frames.iter().find(|(child, _)| *child == entity) {
+        let frame = match frames.get(&entity) {
             None => Frame::WORLD,
-            Some((_, Some(frame))) => *frame,
-            Some((_, None)) => continue, // there is no way back from a scale of zero
+            Some(Some(frame)) => *frame,
+            Some(None) => continue,
         };
-        let place = frame.local(from_point(body.position));
-        let rotation = frame.turned(from_rotation(body.rotation));
-        let now = (bits(place), rotation_bits(rotation));
-        if now != (bits(transform.translation), rotation_bits(transform.rotation)) {
-            (transform.translation, transform.rotation) = (place, rotation);
-        }
-        state.seen.place = now;
+        put(&body, &frame, &mut transform, &mut state);
         if let Some(mut velocity) = velocity {
             let now = from_vector(body.velocity);
             state.seen.velocity[0] = Some(bits(now));
@@ -372,6 +486,33 @@ pub(crate) fn scatter(
                 commands.entity(entity).try_remove::<Sleeping>();
             }
             _ => {}
+        }
+    }
+}
+
+/// Run condition: there are bodies that are children.
+pub(crate) fn any_child(bodies: Query<(), (With<Body>, With<ChildOf>)>) -> bool {
+    !bodies.is_empty()
+}
+
+/// Keeps bodies that are children where they are while their parents move between steps, unless somebody moved them,
+/// too.
+pub(crate) fn stay(
+    world: Res<TawWorld>,
+    mut transforms: ParamSet<(
+        TransformHelper,
+        Query<(Entity, &mut Transform, &mut BodyState), With<ChildOf>>,
+    )>,
+    children: Query<(Entity, &ChildOf), With<Body>>,
+) {
+    let frames = frames_of(&children, &transforms.p0());
+    for (entity, mut transform, mut state) in &mut transforms.p1() {
+        let now = (bits(transform.translation), rotation_bits(transform.rotation));
+        if now == state.seen.place
+            && let Some(Some(frame)) = frames.get(&entity)
+            && let Some(body) = state.id.and_then(|id| world.bodies.motion(id).ok())
+        {
+            put(&body, frame, &mut transform, &mut state);
         }
     }
 }

@@ -1,16 +1,21 @@
 //! Joints between marbles, bodies and places in the world.
 
+use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::query::QueryData;
 use bevy::ecs::world::DeferredWorld;
 use bevy::prelude::*;
+use taw::body::BodyId;
 use taw::frame::Pose;
 use taw::joint as core;
 use taw::joint::JointId;
+use taw::world::MarbleId;
 
 use crate::body::{Body, BodyState};
 use crate::components::{Marble, MarbleState};
 use crate::convert::{to_rotation, to_vector};
 use crate::refusal::Refusals;
 use crate::resources::TawWorld;
+use crate::snapshot::RowRemoved;
 
 /// Joint: an entity of its own that holds two others, or one and a place in the world. It goes when one of them does.
 ///
@@ -236,15 +241,16 @@ impl From<JointKind> for core::JointKind<f32> {
 }
 
 impl TawWorld {
-    /// Handle of an entity's joint in [`World::joints`](taw::world::World::joints), by which its force and torque are
-    /// read.
+    /// Handle of an entity's joint in [`World::joints`](taw::world::World::joints), by which its force, torque and
+    /// position are read: that is the angle of a hinge, or the way along a slider.
     ///
     /// ```
     /// # use bevy::prelude::*;
     /// # use bevy_taw::prelude::*;
     /// fn creak(hinges: Query<Entity, With<Joint>>, world: Res<TawWorld>) -> Result {
     ///     for id in hinges.iter().filter_map(|hinge| world.joint_id(hinge)) {
-    ///         if world.joints.force(id)? > 500.0 {
+    ///         let angle = world.joints.position(id)?.unwrap_or(0.0);
+    ///         if angle > 1.0 && world.joints.force(id)? > 500.0 {
     ///             info!("creak");
     ///         }
     ///     }
@@ -257,93 +263,155 @@ impl TawWorld {
     }
 }
 
+/// Components of a joint entity.
+#[derive(QueryData)]
+#[query_data(mutable)]
+pub(crate) struct JointComponents {
+    entity: Entity,
+    joint: Ref<'static, Joint>,
+    is_disabled: Has<Disabled>,
+    state: &'static mut JointState,
+}
+
+/// Marbles and bodies.
+type Held<'w, 's> = Query<
+    'w,
+    's,
+    (Option<&'static MarbleState>, Option<&'static BodyState>),
+    (Or<(With<Marble>, With<Body>)>, Allow<Disabled>),
+>;
+
+/// End of a joint.
+enum Found {
+    There(core::JointEnd<f32>),
+    /// Its entity is out of the world for a time: disabled, refused, or not there yet.
+    Away,
+    /// Its entity is neither a marble nor a body, or none any more.
+    Gone,
+}
+
+impl JointEnd {
+    fn find(&self, held: &Held, world: &TawWorld) -> Found {
+        let frame =
+            Pose { rotation: to_rotation(self.rotation), translation: to_vector(self.anchor) };
+        let Some(entity) = self.entity else {
+            return Found::There(core::JointEnd::World { frame });
+        };
+        let Ok((marble, body)) = held.get(entity) else { return Found::Gone };
+        let marble = marble.and_then(|it| it.id).filter(|id| world.marbles.row(*id).is_ok());
+        match (marble, body.and_then(|it| it.id)) {
+            (Some(marble), _) => Found::There(core::JointEnd::Marble { marble, frame }),
+            (_, Some(body)) => Found::There(core::JointEnd::Body { body, frame }),
+            _ => Found::Away,
+        }
+    }
+}
+
+fn held_by(end: core::JointEnd<f32>) -> (Option<MarbleId>, Option<BodyId>) {
+    (end.marble_id(), end.body_id())
+}
+
+impl JointComponentsItem<'_, '_> {
+    /// Takes the joint out of the world until it comes back.
+    fn leave(&mut self, world: &mut TawWorld) {
+        if let Some(id) = self.state.id.take() {
+            let _ = world.joints.remove(id); // or one of its ends went
+            world.joint_entities.remove(&id);
+        }
+    }
+
+    /// Puts the joint in, or takes over what was written.
+    fn take_over(
+        &mut self,
+        world: &mut TawWorld,
+        ends: [core::JointEnd<f32>; 2],
+    ) -> Result<JointId, taw::Error> {
+        let joint = core::Joint {
+            ends,
+            kind: self.joint.kind.into(),
+            collide_connected: self.joint.collide_connected,
+            breaking_force: self.joint.breaking_force.unwrap_or(f32::INFINITY),
+            breaking_torque: self.joint.breaking_torque.unwrap_or(f32::INFINITY),
+        };
+        match self.state.id {
+            Some(id) => world.joints.set(id, joint).map(|()| id),
+            None => world.joints.insert(joint),
+        }
+    }
+}
+
+/// Run condition: there are joints, also disabled ones.
+pub(crate) fn any(joints: Query<(), (With<Joint>, Allow<Disabled>)>) -> bool {
+    !joints.is_empty()
+}
+
 /// Puts new joints in, changes those that were written, and takes the component of those whose ends are gone.
-#[allow(clippy::too_many_lines, reason = "to be split: it reads, compares and sets")]
 pub(crate) fn gather(
     mut world: ResMut<TawWorld>,
-    mut joints: Query<(Entity, Ref<Joint>, &mut JointState)>,
-    held: Query<(Option<&MarbleState>, Option<&BodyState>), Or<(With<Marble>, With<Body>)>>,
+    mut joints: Query<JointComponents, Allow<Disabled>>,
+    held: Held,
     mut refusals: Refusals,
     mut commands: Commands,
 ) {
     let is_known = world.model().response.knows_bodies();
-    let (mut ready, mut loose) = (Vec::new(), Vec::new());
-    for (entity, joint, mut state) in &mut joints {
-        if !is_known {
-            if let Some(id) = state.id.take() {
-                let _ = world.joints.remove(id); // or the game took it out by itself
-                world.joint_entities.remove(&id);
+    let restored = world.just_restored;
+    for mut it in &mut joints {
+        let entity = it.entity;
+        let ends = match it.joint.ends.each_ref().map(|end| end.find(&held, &world)) {
+            [Found::Gone, _] | [_, Found::Gone] => {
+                commands.entity(entity).try_remove::<Joint>();
+                continue;
             }
-            continue; // its bodies say why, or its marbles go on without it
-        }
-        let known = state.id.filter(|id| world.joints.get(*id).is_ok());
-        if state.id.is_some() && known.is_none() {
-            loose.push(entity); // an end is gone
-            state.id = None;
-            continue;
-        }
-        if (known.is_some() || state.refused) && !joint.is_changed() {
-            continue;
-        }
-        let mut ends = [None; 2];
-        for (end, found) in joint.ends.iter().zip(&mut ends) {
-            let frame =
-                Pose { rotation: to_rotation(end.rotation), translation: to_vector(end.anchor) };
-            *found = match end.entity {
-                None => Some(core::JointEnd::World { frame }),
-                Some(other) => match held.get(other) {
-                    Err(_) => {
-                        loose.push(entity);
-                        None
-                    }
-                    Ok((marble, body)) => {
-                        let marble = marble.and_then(|it| it.id);
-                        let body = body.and_then(|it| it.id);
-                        match (marble, body) {
-                            (Some(marble), _) => Some(core::JointEnd::Marble { marble, frame }),
-                            (_, Some(body)) => Some(core::JointEnd::Body { body, frame }),
-                            _ => None, // refused, or not there yet
-                        }
-                    }
-                },
-            };
-        }
-        if let [Some(first), Some(second)] = ends {
-            ready.push((
-                entity,
-                known,
-                core::Joint {
-                    ends: [first, second],
-                    kind: joint.kind.into(),
-                    collide_connected: joint.collide_connected,
-                    breaking_force: joint.breaking_force.unwrap_or(f32::INFINITY),
-                    breaking_torque: joint.breaking_torque.unwrap_or(f32::INFINITY),
-                },
-            ));
-        }
-    }
-    for (entity, known, joint) in ready {
-        let set = match known {
-            Some(id) => world.joints.set(id, joint).map(|()| id),
-            None => world.joints.insert(joint),
+            [Found::There(first), Found::There(second)] if is_known && !it.is_disabled => {
+                [first, second]
+            }
+            _ => {
+                it.leave(&mut world); // its bodies say why, or its marbles go on without it
+                continue;
+            }
         };
-        match set {
+        let known = it.state.id.and_then(|id| world.joints.get(id).ok()).map(|known| known.ends);
+        if known.is_none() {
+            it.leave(&mut world);
+        }
+        let holds = known.is_some_and(|known| known.map(held_by) == ends.map(held_by));
+        if (holds || it.state.refused) && !it.joint.is_changed() && !restored {
+            continue;
+        }
+        match it.take_over(&mut world, ends) {
             Ok(id) => {
+                (it.state.id, it.state.refused) = (Some(id), false);
                 world.joint_entities.insert(id, entity);
-                if let Ok((.., mut state)) = joints.get_mut(entity) {
-                    *state = JointState { id: Some(id), refused: false };
-                }
             }
             Err(error) => {
-                if let Ok((.., mut state)) = joints.get_mut(entity) {
-                    state.refused = true;
-                }
+                it.state.refused = true;
                 refusals.check(Some(entity), Err::<(), _>(error));
             }
         }
     }
-    for entity in loose {
-        commands.entity(entity).try_remove::<Joint>();
+}
+
+/// Gives joint entities the rows that they have in a restored world, and takes out those that no entity stands behind.
+pub(crate) fn name(
+    mut world: ResMut<TawWorld>,
+    mut joints: Query<&mut JointState, Allow<Disabled>>,
+    mut removed: MessageWriter<RowRemoved>,
+) {
+    for mut state in &mut joints {
+        *state = JointState::default();
+    }
+    let known: Vec<_> = world.joint_entities.iter().map(|(id, entity)| (*id, *entity)).collect();
+    for (id, entity) in known {
+        match joints.get_mut(entity) {
+            Ok(mut state) => state.id = Some(id),
+            Err(_) => {
+                world.joint_entities.remove(&id);
+                if world.joints.remove(id).is_ok() {
+                    log::warn!("taw took out {id:?}: no entity stands behind it");
+                    removed.write(RowRemoved::Joint(id));
+                }
+            }
+        }
     }
 }
 

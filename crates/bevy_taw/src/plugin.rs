@@ -24,7 +24,7 @@ use crate::pair_filter::{self, FilterPairs, FilteredPairs};
 use crate::refusal::{self, InputRefused, MarbleStopped, Refusals, Told, report};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::schedule::{SchedulePlugin, TawSchedule};
-use crate::snapshot::RowRemoved;
+use crate::snapshot::{self, RowRemoved};
 use crate::spatial_query::SpatialTree;
 use crate::swarm::{self, Swarm, TawSwarmModel};
 use crate::touches::{self, Touches};
@@ -196,7 +196,8 @@ fn observe(app: &mut App) {
         .add_observer(joint::forget);
     app.add_systems(
         PostUpdate,
-        scatter::stay.run_if(scatter::any_child).before(TransformSystems::Propagate),
+        (scatter::stay.run_if(scatter::any_child), body::stay.run_if(body::any_child))
+            .before(TransformSystems::Propagate),
     );
     if TawSchedule::of(app).is_fixed(app.world()) {
         note_walls_between_steps(app);
@@ -268,9 +269,9 @@ fn add_gather(app: &mut App) {
                 .chain()
                 .run_if(pair_filter::any),
             ignore::gather.run_if(ignore::any),
-            body::gather.run_if(any_with_component::<Body>),
-            body::forces.run_if(any_with_component::<Body>),
-            joint::gather.run_if(any_with_component::<Joint>),
+            (body::name, joint::name).chain().run_if(snapshot::was_restored),
+            (body::gather, body::forces).chain().run_if(body::any),
+            joint::gather.run_if(joint::any),
             gather::forces,
             zones::act,
             refusal::leave_out,

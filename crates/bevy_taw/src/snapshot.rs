@@ -3,6 +3,8 @@
 use bevy::ecs::entity::Entities;
 use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
+use taw::body::BodyId;
+use taw::joint::JointId;
 use taw::swarm::BallId;
 use taw::world::{MarbleId, SensorId, WallId};
 
@@ -19,6 +21,8 @@ pub struct TawSnapshot {
     world: taw::world::World<f32>,
     marble_entities: HashMap<MarbleId, Entity>,
     wall_entities: HashMap<WallId, Entity>,
+    body_entities: HashMap<BodyId, Entity>,
+    joint_entities: HashMap<JointId, Entity>,
     sensor_entities: HashMap<SensorId, Entity>,
     ball_entities: Vec<Option<Entity>>,
     sensed_balls: Vec<SensedBall>,
@@ -38,6 +42,10 @@ pub enum RowRemoved {
     Wall(WallId),
     /// A ball of a swarm.
     Ball(BallId),
+    /// A rigid body.
+    Body(BodyId),
+    /// A joint.
+    Joint(JointId),
 }
 
 impl TawWorld {
@@ -49,6 +57,8 @@ impl TawWorld {
             world: self.world.clone(),
             marble_entities: self.marble_entities.clone(),
             wall_entities: self.wall_entities.clone(),
+            body_entities: self.body_entities.clone(),
+            joint_entities: self.joint_entities.clone(),
             sensor_entities: self.sensor_entities.clone(),
             ball_entities: self.ball_entities.clone(),
             sensed_balls: self.sensed_balls.clone(),
@@ -61,11 +71,12 @@ impl TawWorld {
 
     /// Lets everything move on from a [`snapshot`](Self::snapshot). With the next step,
     ///
-    /// - marbles go on from where they were then, as fast as they were; what else they are
-    ///   (radius, mass, material ...) is in their components, as ever, and so are the model,
+    /// - marbles and bodies go on from where they were then, as fast as they were; what else they are
+    ///   (radius, mass, material ...) is in their components, as ever, and so are joints, the model,
     ///   gravity and forces. A component that is written between this and that step counts.
     /// - walls are where their entities' `Transform`s are, at rest until they move.
-    /// - marbles and walls that were spawned since are put in again, as their components say.
+    /// - marbles, bodies, joints and walls that were spawned since are put in again, as their components say. A joint
+    ///   that broke since has lost its component, and stays broken.
     /// - rows of entities that are gone by now are taken out, and each is told as a
     ///   [`RowRemoved`]. So are balls that a [`Swarm`](crate::swarm::Swarm) has lost; balls that
     ///   it got since are lost.
@@ -88,6 +99,8 @@ impl TawWorld {
         self.world = snapshot.world.clone();
         self.marble_entities.clone_from(&snapshot.marble_entities);
         self.wall_entities.clone_from(&snapshot.wall_entities);
+        self.body_entities.clone_from(&snapshot.body_entities);
+        self.joint_entities.clone_from(&snapshot.joint_entities);
         self.stale_sensors.extend(self.sensor_entities.values());
         self.sensor_entities.clone_from(&snapshot.sensor_entities);
         self.ball_entities.clone_from(&snapshot.ball_entities);
@@ -101,6 +114,11 @@ impl TawWorld {
         self.restored = self.restored.wrapping_add(1);
         self.just_restored = true;
     }
+}
+
+/// Run condition: the world was restored since the last gather.
+pub(crate) fn was_restored(world: Res<TawWorld>) -> bool {
+    world.just_restored
 }
 
 /// Gives marble entities the rows that they have in a restored world.

@@ -17,10 +17,10 @@ mod system;
 pub use crate::handle::BodyId;
 pub use list::{Bodies, BodyPlace};
 
+pub(crate) use body_state::BodyState;
 pub(crate) use contact::{
     BodyContact, BodyContactKey, BodyPartner, SweptManifold, ball_contact, manifold_contact,
 };
-pub(crate) use body_state::BodyState;
 pub(crate) use state::{SolverBody, turned_freely};
 pub(crate) use system::BodySystem;
 

@@ -26,6 +26,8 @@ pub(crate) struct JointState<S> {
     pub gain: f64,
     /// Largest force in N and torque in N m of the last step.
     pub load: [S; 2],
+    /// Position of its free axis at the end of the last step, in rad or metres.
+    pub position: Option<S>,
 }
 
 /// Joints of a world, which only [`SoftStep`](crate::response::Response::SoftStep) knows: other responses refuse to
@@ -149,6 +151,16 @@ impl<S: Scalar> Joints<S> {
         Ok(self.states[self.row(id)?].load[1])
     }
 
+    /// Position of its free axis at the end of the last step: the angle of a hinge or a wheel in rad, in (−π, π], or
+    /// the way along a slider in metres, both as its limits count them. None of the other kinds, and before the first
+    /// step.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchJoint`].
+    pub fn position(&self, id: JointId) -> Result<Option<S>, Error> {
+        Ok(self.states[self.row(id)?].position)
+    }
+
     /// Handles of all joints.
     pub fn ids(&self) -> impl Iterator<Item = JointId> + '_ {
         (0..self.states.len()).filter_map(|row| self.handles.handle(row).map(JointId))
@@ -225,6 +237,7 @@ impl<S: Scalar> JointState<S> {
             pull: 0.0,
             gain: 0.0,
             load: [S::zero(); 2],
+            position: None,
         }
     }
 

@@ -129,6 +129,15 @@ impl JointFrames {
         }
     }
 
+    /// Position of the free axis of a kind, in rad or metres; none of one without.
+    pub fn position(&self, kind: &JointKind<f64>) -> Option<f64> {
+        match kind {
+            JointKind::Hinge(_) | JointKind::Wheel { .. } => Some(self.twist()),
+            JointKind::Slider(_) => Some(self.axes()[0].dot(self.offset())),
+            _ => None,
+        }
+    }
+
     /// Axes of the first frame, in the world.
     fn axes(&self) -> [Vec3<f64>; 3] {
         [Vec3::unit_x(), Vec3::unit_y(), Vec3::unit_z()].map(|axis| self.frames[0].rotation * axis)

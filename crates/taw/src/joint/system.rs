@@ -168,6 +168,12 @@ impl JointSystem {
         *first..first + count(kind)
     }
 
+    /// Position of the free axis of a joint, in rad or metres.
+    pub fn position(&self, joint: usize) -> Option<f64> {
+        let joint = &self.joints[joint];
+        self.frames(joint, |body| body.pose).position(&joint.kind)
+    }
+
     /// Frames of a joint, with bodies at these poses.
     pub(super) fn frames(
         &self,

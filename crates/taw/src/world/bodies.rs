@@ -210,8 +210,7 @@ impl<S: Scalar> World<S> {
                     let other = &solver[other];
                     let moves = !other.velocity.is_zero() || !other.spin.is_zero();
                     lies[body] = true;
-                    is_driven[body] |=
-                        other.slot == NO_ROW && other.inverse_mass == 0.0 && moves;
+                    is_driven[body] |= other.slot == NO_ROW && other.inverse_mass == 0.0 && moves;
                 }
             }
         }

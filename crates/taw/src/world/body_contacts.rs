@@ -329,11 +329,8 @@ impl<S: Scalar> World<S> {
                     system.bodies.push(SolverBody::ball(ball.slot));
                 }
                 let bodies = [(system.bodies.len() - 1) as u32, row as u32];
-                let key = BodyContactKey {
-                    partner: BodyPartner::Ball(ball.id),
-                    body,
-                    parts: [0, part],
-                };
+                let key =
+                    BodyContactKey { partner: BodyPartner::Ball(ball.id), body, parts: [0, part] };
                 let material = ball.material.combined_with(state.body.material).cast();
                 system.contacts.push(ball_contact(key, bodies, ball.radius(), material));
             }

@@ -188,7 +188,8 @@ impl<S: Scalar> World<S> {
             return;
         }
         let system = self.swarm.take_joints();
-        for (joint, state) in system.joints.iter().zip(&mut self.joints.states) {
+        for (at, (joint, state)) in system.joints.iter().zip(&mut self.joints.states).enumerate() {
+            state.position = system.position(at).map(S::from_f64);
             (state.impulses, state.slip) = (joint.impulses, joint.slip);
             (state.pull, state.gain) = (joint.pull, joint.gain);
             state.load = joint.load.map(S::from_f64);

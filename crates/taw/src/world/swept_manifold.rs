@@ -27,10 +27,8 @@ pub(super) fn swept_manifold(
     ContactReach { margin, slack, dt }: ContactReach,
 ) -> Option<SweptManifold> {
     // As fast as they are in its middle.
-    let ends = ends.map(|end| SolverBody {
-        velocity: end.velocity + end.acceleration * (0.5 * dt),
-        ..*end
-    });
+    let ends = ends
+        .map(|end| SolverBody { velocity: end.velocity + end.acceleration * (0.5 * dt), ..*end });
     let (found, radii) = manifold_of(colliders, margin)?;
     let is_near = found.points.iter().any(|point| point.distance <= slack);
     let is_plane = matches!(colliders[0], WallCollider::Plane { .. });

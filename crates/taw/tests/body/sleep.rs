@@ -110,16 +110,13 @@ fn a_slow_conveyor_carries_a_box_on() {
     assert!((way - 0.6).abs() < 5e-3, "{way}");
 }
 
-/// Nothing bears a body without weight in the air, nor one that is thrown upward where it turns back.
+/// A body without weight, which nothing bears in the air, goes on.
 #[test]
 fn what_floats_slowly_floats_on() {
     let mut world = world::<f32>(true);
     let velocity = vector(0.02, 0.0, 0.0);
-    let body = Body {
-        gravity_scale: 0.0,
-        velocity,
-        ..cuboid([0.2, 0.1, 0.2], point(0.0, 3.0, 0.0))
-    };
+    let body =
+        Body { gravity_scale: 0.0, velocity, ..cuboid([0.2, 0.1, 0.2], point(0.0, 3.0, 0.0)) };
     let body = world.bodies.insert(body).unwrap();
     run(&mut world, 20.0);
     let way = place(&world, body).x;
@@ -158,7 +155,7 @@ fn a_wall_that_moves_strikes_a_body() {
     }
 }
 
-/// A body that begins to fall from rest does not sleep while nothing bears it.
+/// A box rises with a kinematic platform that rises by 1 cm/s.
 #[test]
 fn a_kinematic_platform_that_creeps_does_not_freeze_what_lies_on_it() {
     let mut world = world::<f32>(false);

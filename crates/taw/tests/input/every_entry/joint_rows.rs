@@ -24,7 +24,7 @@ pub fn joints<S: Scalar>() -> Vec<Row<S>> {
             let ends = if p.case == 6 { [JointEnd::world(Point3::new(x, x, S::zero())), ends[1]] } else { ends };
             with_joint(p, Joint::new(kind, ends))
         };
-        World 2 "Joints::get Joints::remove Joints::force Joints::torque": |p, x| {
+        World 2 "Joints::get Joints::remove Joints::force Joints::torque Joints::position": |p, x| {
             let ends = [JointEnd::world(Point3::new(S::zero(), S::one(), S::zero())), JointEnd::marble(p.subject, Vec3::new(S::zero(), S::zero(), S::zero()))];
             let joint = Joint::new(JointKind::BallAndSocket, ends);
             with_joint(p, if p.case == 0 { Joint { breaking_force: x, ..joint } } else { Joint { breaking_torque: x, ..joint } })
@@ -44,6 +44,7 @@ fn with_joint<S: Scalar>(p: &mut Place<S>, joint: Joint<S>) -> Result<(), Error>
     p.world.joints.get(id)?;
     p.world.joints.force(id)?;
     p.world.joints.torque(id)?;
+    p.world.joints.position(id)?;
     if p.world.model().response != Response::SoftStep {
         p.world.joints.remove(id)?;
     }
