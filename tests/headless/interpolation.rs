@@ -28,6 +28,38 @@ fn motion_is_even_between_steps() {
     }
 }
 
+/// A body is drawn on its way as a marble is, and goes where it is put between two steps.
+#[test]
+fn a_body_is_drawn_evenly_and_keeps_what_is_written_between_steps() {
+    let (mut app, _) = app();
+    let body = (
+        Body::from(Cuboid::new(0.2, 0.2, 0.2)),
+        Velocity(Vec3::X / STEP),
+        AngularVelocity(Vec3::Z * 8.0),
+        Transform::from_xyz(0.0, 5.0, 0.0),
+    );
+    let body = app.world_mut().spawn(body).id();
+    scene::frames(&mut app, 8);
+    let mut last = scene::position(&app, body).x;
+    for frame in 0..20 {
+        app.update();
+        let now = scene::position(&app, body).x;
+        assert!((now - last - 0.25).abs() < 1e-4, "frame {frame} moved it by {}", now - last);
+        last = now;
+    }
+    for wait in 0..4 {
+        scene::frames(&mut app, wait);
+        let put = Transform::from_xyz(100.0, 7.0, f32::from(wait as u8));
+        *app.world_mut().get_mut::<Transform>(body).unwrap() = put;
+        scene::frames(&mut app, 4);
+        let drawn = scene::position(&app, body);
+        assert!((100.0..=101.01).contains(&drawn.x), "after {wait}: {drawn}");
+        assert_eq!((drawn.y, drawn.z), (7.0, put.translation.z), "after {wait}");
+        let turned = app.world().get::<Transform>(body).unwrap().rotation;
+        assert!(turned.angle_between(Quat::IDENTITY) < 8.0 * STEP + 1e-3, "after {wait}");
+    }
+}
+
 #[test]
 fn what_crosses_a_side_of_a_periodic_box_is_drawn_on_its_way() {
     let (mut app, marble) = app();

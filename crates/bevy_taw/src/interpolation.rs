@@ -3,7 +3,7 @@
 //! The picture lies between the last two steps, so it lags by up to one:
 //! outside the fixed schedules, read a marble's true place from the
 //! [`TawWorld`], or leave this plugin out.
-//! Marbles get it by themselves, in world space, whatever carries them, and so do walls that move, in
+//! Marbles and bodies get it by themselves, in world space, whatever carries them, and so do walls that move, in
 //! whatever schedule: a lift and its riders are drawn together. Of walls it is the `GlobalTransform` that is
 //! drawn, with those of what carries them or is carried along; their `Transform` is what the game wrote.
 //! While [`Time<Virtual>`] stands still or the physics does not run, a wall that is moved is drawn where its
@@ -15,7 +15,7 @@
 //! A system in `Update` sees the `Transform` that is drawn. If it writes there,
 //!
 //! - coordinates that it leaves alone go on as they were;
-//! - a small change, by no more than the marble's radius (or a radian), moves the marble by so
+//! - a small change, by no more than the marble's radius, or the reach of a body (or a radian), moves the marble by so
 //!   much from where it truly is, so that a nudge in every frame takes nothing away from its
 //!   motion;
 //! - a larger one is a place: the marble is exactly there. So is a coordinate that it has or
@@ -29,15 +29,17 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use bevy::ecs::schedule::ScheduleLabel;
 use bevy::prelude::*;
 use bevy::transform::systems::sync_simple_transforms;
 use bevy_transform_interpolation::TransformEasingSystems;
 use bevy_transform_interpolation::prelude::*;
 
 use crate::TawSystems;
-use crate::body::Body;
+use crate::body::{Body, BodyState};
 use crate::components::{Eased, Marble, MarbleState, Teleport, bits, rotation_bits};
-use crate::convert::{from_point, from_rotation, to_point, to_rotation};
+use crate::convert::{from_point, to_point};
+use crate::placed::Placed;
 use crate::resources::TawWorld;
 use crate::scatter::{Frame, put};
 use crate::schedule::TawSchedule;
@@ -45,7 +47,7 @@ use crate::wall_drawing;
 
 pub use bevy_transform_interpolation as transform_interpolation;
 
-/// Interpolates every marble's translation, and its rotation if the model has one, and draws walls that
+/// Interpolates the translation of every marble and body, and its rotation if the model has one, and draws walls that
 /// move where the marbles that are drawn meet them. What has `NoTransformEasing` is left out. Does nothing where the step is
 /// [in a schedule](crate::TawPlugins::in_schedule) outside of the fixed main loop.
 #[derive(Debug, Default)]
@@ -60,90 +62,87 @@ impl Plugin for TawInterpolationPlugin {
         if !app.is_plugin_added::<TransformInterpolationPlugin>() {
             app.add_plugins(TransformInterpolationPlugin::default());
         }
-        app.register_required_components::<Body, TransformInterpolation>();
         // That crate eases what it is told to in its parent's frame, which may move by itself.
         app.register_required_components::<Marble, Eased>();
         app.register_required_components::<Marble, NoTranslationEasing>();
         app.register_required_components::<Marble, NoRotationEasing>();
+        app.register_required_components::<Body, Eased>();
+        app.register_required_components::<Body, NoTranslationEasing>();
+        app.register_required_components::<Body, NoRotationEasing>();
+        add::<MarbleState>(app, schedule.label());
+        add::<BodyState>(app, schedule.label());
         app.add_systems(
-            RunFixedMainLoop,
-            (
-                (undo, undo_children).chain().in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
-                (ease, ease_children)
-                    .chain()
-                    .in_set(RunFixedMainLoopSystems::AfterFixedMainLoop)
-                    .after(TransformEasingSystems::Ease),
-            ),
-        )
-        // By then, what carries marbles is where its last step took it.
-        .add_systems(
-            FixedFirst,
-            undo_children.after(TransformEasingSystems::Reset).before(TawSystems::Control),
-        )
-        .add_systems(
-            schedule.label(),
-            note_start.after(TawSystems::Gather).before(TawSystems::Step),
-        )
-        // And by now, where this frame took it.
-        .add_systems(
             PostUpdate,
-            (
-                ease_children.before(TransformSystems::Propagate),
-                wall_drawing::draw
-                    .in_set(TransformSystems::Propagate)
-                    .after(sync_simple_transforms),
-            ),
+            wall_drawing::draw.in_set(TransformSystems::Propagate).after(sync_simple_transforms),
         );
     }
 }
 
-type Drawn<'a> = (&'a Marble, &'a mut MarbleState, &'a mut Transform, &'a mut Eased, Has<Teleport>);
-type Roots<'w, 's> = Query<'w, 's, Drawn<'static>, (Without<ChildOf>, Without<NoTransformEasing>)>;
-type Children<'w, 's> =
-    Query<'w, 's, (Drawn<'static>, Entity, &'static ChildOf), Without<NoTransformEasing>>;
+/// Adds the easing of marbles or of bodies.
+fn add<T: Placed>(app: &mut App, schedule: impl ScheduleLabel) {
+    app.add_systems(
+        RunFixedMainLoop,
+        (
+            (undo::<T>, undo_children::<T>)
+                .chain()
+                .in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
+            (ease::<T>, ease_children::<T>)
+                .chain()
+                .in_set(RunFixedMainLoopSystems::AfterFixedMainLoop)
+                .after(TransformEasingSystems::Ease),
+        ),
+    )
+    // By then, what carries them is where its last step took it.
+    .add_systems(
+        FixedFirst,
+        undo_children::<T>.after(TransformEasingSystems::Reset).before(TawSystems::Control),
+    )
+    .add_systems(schedule, note_start::<T>.after(TawSystems::Gather).before(TawSystems::Step))
+    // And by now, where this frame took it.
+    .add_systems(PostUpdate, ease_children::<T>.before(TransformSystems::Propagate));
+}
+
+type Drawn<'a, T> = (&'a mut T, &'a mut Transform, &'a mut Eased, Has<Teleport>);
+type Roots<'w, 's, T> =
+    Query<'w, 's, Drawn<'static, T>, (Without<ChildOf>, Without<NoTransformEasing>)>;
+type Children<'w, 's, T> =
+    Query<'w, 's, (Drawn<'static, T>, Entity, &'static ChildOf), Without<NoTransformEasing>>;
 
 /// Notes where marbles are when a step begins.
-fn note_start(world: Res<TawWorld>, mut marbles: Query<(&MarbleState, &mut Eased)>) {
+fn note_start<T: Placed>(world: Res<TawWorld>, mut marbles: Query<(&T, &mut Eased)>) {
     marbles.par_iter_mut().for_each(|(state, mut eased)| {
         eased.restored = world.restored;
-        eased.from = place(&world, state);
+        eased.from = state.place(&world);
     });
 }
 
-/// Simulated position of a marble, and its rotation if the model knows one.
-fn place(world: &TawWorld, state: &MarbleState) -> Option<(Vec3, Option<Quat>)> {
-    let row = world.marbles.row(state.id?).ok()?;
-    let rotation = world.marbles.rotation().get(row).copied().map(from_rotation);
-    Some((from_point(world.marbles.position()[row]), rotation))
-}
-
 /// Draws marbles between the last two steps, except those that somebody moved since.
-fn ease(world: Res<TawWorld>, time: Res<Time<Fixed>>, mut marbles: Roots) {
+fn ease<T: Placed>(world: Res<TawWorld>, time: Res<Time<Fixed>>, mut marbles: Roots<T>) {
     let part = time.overstep_fraction();
-    marbles.par_iter_mut().for_each(|(_, state, transform, eased, _)| {
+    marbles.par_iter_mut().for_each(|(state, transform, eased, _)| {
         draw(&world, &eased, part, state, transform, &Frame::WORLD);
     });
 }
 
 /// Draws marbles that are children, wherever their parents are drawn.
-fn ease_children(
+fn ease_children<T: Placed>(
     world: Res<TawWorld>,
     time: Res<Time<Fixed>>,
-    mut marbles: ParamSet<(Children, TransformHelper)>,
+    mut marbles: ParamSet<(Children<T>, TransformHelper)>,
     mut frames: Local<Vec<(Entity, Frame)>>,
 ) {
     let part = time.overstep_fraction();
     find_frames(&mut marbles, &mut frames);
     let mut marbles = marbles.p0();
     for (entity, frame) in &*frames {
-        if let Ok(((_, state, transform, eased, _), ..)) = marbles.get_mut(*entity) {
+        if let Ok(((state, transform, eased, _), ..)) = marbles.get_mut(*entity) {
             draw(&world, &eased, part, state, transform, frame);
         }
     }
 }
 
-fn find_frames(
-    marbles: &mut ParamSet<(Children, TransformHelper)>,
+fn find_frames<T: Placed>(
+    marbles: &mut ParamSet<(Children<T>, TransformHelper)>,
     frames: &mut Vec<(Entity, Frame)>,
 ) {
     frames.clear();
@@ -155,15 +154,15 @@ fn find_frames(
     }));
 }
 
-fn draw(
+fn draw<T: Placed>(
     world: &TawWorld,
     eased: &Eased,
     part: f32,
-    mut state: Mut<MarbleState>,
+    mut state: Mut<T>,
     mut transform: Mut<Transform>,
     frame: &Frame,
 ) {
-    let Some((mut position, mut rotation)) = place(world, &state) else { return };
+    let Some((mut position, mut rotation)) = state.place(world) else { return };
     if eased.restored == world.restored
         && let Some((start, turned)) = eased.from
     {
@@ -172,8 +171,9 @@ fn draw(
         position = start.lerp(position, part);
         rotation = rotation.map(|end| turned.map_or(end, |start| start.slerp(end, part)));
     }
-    let moved = bits(transform.translation) != state.seen.translation;
-    let turned = rotation_bits(transform.rotation) != state.seen.rotation;
+    let (seen, turned) = state.seen();
+    let moved = bits(transform.translation) != seen;
+    let turned = rotation_bits(transform.rotation) != turned;
     if !moved {
         put(&mut transform, &mut state, frame, Some(position), None);
     }
@@ -184,9 +184,9 @@ fn draw(
 
 /// Takes marbles from where they are drawn to where they truly are, and takes over what was
 /// written in between.
-fn undo(mut world: ResMut<TawWorld>, mut marbles: Roots) {
+fn undo<T: Placed>(mut world: ResMut<TawWorld>, mut marbles: Roots<T>) {
     let any = AtomicBool::new(false);
-    marbles.par_iter_mut().for_each(|(_, state, transform, eased, _)| {
+    marbles.par_iter_mut().for_each(|(state, transform, eased, _)| {
         if !go_back(&world, state, transform, eased, &Frame::WORLD) {
             any.store(true, Ordering::Relaxed);
         }
@@ -199,35 +199,36 @@ fn undo(mut world: ResMut<TawWorld>, mut marbles: Roots) {
 }
 
 /// Undoes the easing of children.
-fn undo_children(
+fn undo_children<T: Placed>(
     mut world: ResMut<TawWorld>,
-    mut marbles: ParamSet<(Children, TransformHelper)>,
+    mut marbles: ParamSet<(Children<T>, TransformHelper)>,
     mut frames: Local<Vec<(Entity, Frame)>>,
 ) {
     find_frames(&mut marbles, &mut frames);
     let mut marbles = marbles.p0();
     for (entity, frame) in &*frames {
         let Ok((marble, ..)) = marbles.get_mut(*entity) else { continue };
-        let (ball, mut state, mut transform, mut eased, teleport) = marble;
+        let (mut state, mut transform, mut eased, teleport) = marble;
         let (again, transformed) = (state.reborrow(), transform.reborrow());
         if !go_back(&world, again, transformed, eased.reborrow(), frame) {
-            let marble = (ball, state, transform, eased, teleport);
+            let marble = (state, transform, eased, teleport);
             take_over(world.bypass_change_detection(), marble, frame);
         }
     }
 }
 
 /// Takes a marble from where it is drawn to where it truly is. Gives whether nobody moved it.
-fn go_back(
+fn go_back<T: Placed>(
     world: &TawWorld,
-    mut state: Mut<MarbleState>,
+    mut state: Mut<T>,
     mut transform: Mut<Transform>,
     mut eased: Mut<Eased>,
     frame: &Frame,
 ) -> bool {
-    let Some((position, rotation)) = place(world, &state) else { return true };
-    let moved = bits(transform.translation) != state.seen.translation;
-    let turned = rotation.is_some() && rotation_bits(transform.rotation) != state.seen.rotation;
+    let Some((position, rotation)) = state.place(world) else { return true };
+    let (seen, turned) = state.seen();
+    let moved = bits(transform.translation) != seen;
+    let turned = rotation.is_some() && rotation_bits(transform.rotation) != turned;
     if !moved {
         put(&mut transform, &mut state, frame, Some(position), None);
         if eased.wrote.is_some() {
@@ -240,41 +241,41 @@ fn go_back(
     !(moved || turned)
 }
 
-type DrawnItem<'a> = (&'a Marble, Mut<'a, MarbleState>, Mut<'a, Transform>, Mut<'a, Eased>, bool);
+type DrawnItem<'a, T> = (Mut<'a, T>, Mut<'a, Transform>, Mut<'a, Eased>, bool);
 
 /// Takes over where somebody moved or turned a marble since it was drawn. What cannot be right
 /// is left to gather, which refuses it.
-fn take_over(
+fn take_over<T: Placed>(
     world: &mut TawWorld,
-    (marble, mut state, mut transform, mut eased, teleport): DrawnItem,
+    (mut state, mut transform, mut eased, teleport): DrawnItem<T>,
     frame: &Frame,
 ) {
-    let (Some(id), Some((end, turned))) = (state.id, place(world, &state)) else { return };
+    let Some((end, turned)) = state.place(world) else { return };
+    let seen = state.seen();
     let (start, turned_before) = eased.from.unwrap_or((end, turned));
     let exact = teleport || world.just_restored;
     let mut from = (start, turned_before);
-    if bits(transform.translation) != state.seen.translation {
+    if bits(transform.translation) != seen.0 {
         let written = Written {
-            seen: Vec3::from_array(state.seen.translation.map(f32::from_bits)),
+            seen: Vec3::from_array(seen.0.map(f32::from_bits)),
             now: transform.translation,
             before: eased.wrote,
-            within: if exact { -1.0 } else { marble.radius },
+            within: if exact { -1.0 } else { state.radius(world) },
         };
         let (end, start) = written.place(frame.local(end), frame.local(start));
-        let position = to_point(frame.world(end));
-        if !end.is_finite() || world.marbles.set_position(id, position).is_err() {
+        if !end.is_finite() || !state.set_position(world, frame.world(end)) {
             eased.from = None;
             return;
         }
         eased.wrote = Some(written.now);
         from.0 = frame.world(start);
         transform.translation = end;
-        state.seen.translation = bits(end);
+        state.see_translation(bits(end));
     }
     if let Some(end) = turned
-        && rotation_bits(transform.rotation) != state.seen.rotation
+        && rotation_bits(transform.rotation) != seen.1
     {
-        let seen = Quat::from_array(state.seen.rotation.map(f32::from_bits));
+        let seen = Quat::from_array(seen.1.map(f32::from_bits));
         let [mut end, mut start] = [end, turned_before.unwrap_or(end)].map(|q| frame.turned(q));
         let now = transform.rotation;
         if !exact && now != start && now != end && seen.angle_between(now) <= 1.0 {
@@ -283,14 +284,13 @@ fn take_over(
         } else {
             (end, start) = (now, now);
         }
-        let rotation = to_rotation(frame.turned_in_world(end));
-        if world.marbles.set_rotation(id, rotation).is_err() {
+        if !state.set_rotation(world, frame.turned_in_world(end)) {
             eased.from = None;
             return;
         }
         from.1 = Some(frame.turned_in_world(start));
         transform.rotation = end;
-        state.seen.rotation = rotation_bits(end);
+        state.see_rotation(rotation_bits(end));
     }
     eased.from = Some(from);
 }

@@ -17,7 +17,8 @@ use crate::refusal::Refusals;
 use crate::resources::TawWorld;
 use crate::snapshot::RowRemoved;
 
-/// Joint: an entity of its own that holds two others, or one and a place in the world. It goes when one of them does.
+/// Joint: an entity of its own that holds two others, or one and a place in the world. It goes when one of them does;
+/// while one is disabled, it waits.
 ///
 /// Hinges and wheels turn about z of the joint's frame, sliders and suspensions go along x. Joints need
 /// [`Response::SoftStep`](taw::response::Response::SoftStep), the default.
@@ -56,7 +57,7 @@ pub struct Joint {
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct JointEnd {
-    /// Marble or body; none for a place in the world. One that is written elsewhere moves there within the next
+    /// Marble or body, and no wall; none for a place in the world. One that is written elsewhere moves there within the next
     /// step, and carries on what hangs on it: so a joint hangs on a wall that moves, which is no end itself.
     pub entity: Option<Entity>,
     /// Anchor in the frame of the entity, or in the world, in metres.
@@ -69,7 +70,8 @@ pub struct JointEnd {
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct JointSpring {
-    /// Oscillations per second without damping, above zero.
+    /// Oscillations per second without damping, above zero, of the two ends if nothing else held them: of an arm that
+    /// hangs on a hinge at its end, whose center has to move with it, it is half as much.
     pub frequency: f32,
     /// Damping over critical damping; at least zero.
     pub damping_ratio: f32,

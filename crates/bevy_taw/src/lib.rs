@@ -178,6 +178,7 @@ pub mod diagnostics;
 mod forget;
 mod gap;
 mod gather;
+mod gather_bodies;
 mod gather_walls;
 #[cfg(feature = "render")]
 pub mod gizmos;
@@ -198,6 +199,7 @@ mod outline;
 pub mod pair_filter;
 #[cfg(feature = "picking")]
 pub mod picking;
+mod placed;
 mod plugin;
 pub mod preview;
 mod reflect;

@@ -3,11 +3,11 @@ use bevy::ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
 use bevy::prelude::*;
 use bevy_transform_interpolation::TransformEasingSystems;
 
-use crate::body::Body;
+use crate::body::{Body, BodyState};
 use crate::components::{
     AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Kinematic, Marble,
-    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
-    SurfaceMaterial, SurfaceVelocity, Teleport, Velocity,
+    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, MarbleState, Sleeping,
+    SleepingDisabled, SurfaceMaterial, SurfaceVelocity, Teleport, Velocity,
 };
 use crate::contact_force::{ContactForce, PairImpulses};
 use crate::contact_points::{self, Points};
@@ -31,8 +31,8 @@ use crate::touches::{self, Touches};
 use crate::wall::Wall;
 use crate::zones::{GravityZone, WindZone, ZoneGravity};
 use crate::{
-    ball_sensor, body, contact_force, controller, forget, gather, gather_walls, grounded, joint,
-    scatter, sensor, sleep, zones,
+    ball_sensor, body, contact_force, controller, forget, gather, gather_bodies, gather_walls,
+    grounded, joint, scatter, sensor, sleep, zones,
 };
 
 /// Everything: the physics, interpolation between its steps, and with the feature
@@ -196,7 +196,10 @@ fn observe(app: &mut App) {
         .add_observer(joint::forget);
     app.add_systems(
         PostUpdate,
-        (scatter::stay.run_if(scatter::any_child), body::stay.run_if(body::any_child))
+        (
+            scatter::stay::<MarbleState>.run_if(scatter::any_child::<MarbleState>),
+            scatter::stay::<BodyState>.run_if(scatter::any_child::<BodyState>),
+        )
             .before(TransformSystems::Propagate),
     );
     if TawSchedule::of(app).is_fixed(app.world()) {
@@ -269,8 +272,8 @@ fn add_gather(app: &mut App) {
                 .chain()
                 .run_if(pair_filter::any),
             ignore::gather.run_if(ignore::any),
-            (body::name, joint::name).chain().run_if(snapshot::was_restored),
-            (body::gather, body::forces).chain().run_if(body::any),
+            (gather_bodies::name, joint::name).chain().run_if(snapshot::was_restored),
+            (gather_bodies::gather, gather_bodies::forces).chain().run_if(gather_bodies::any),
             joint::gather.run_if(joint::any),
             gather::forces,
             zones::act,

@@ -9,6 +9,7 @@ use crate::components::{
 };
 use crate::convert::{from_point, from_rotation, from_vector};
 use crate::gather::{ChangedMarbles, MANY};
+use crate::placed::Placed;
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
 
@@ -49,9 +50,9 @@ impl Frame {
 
 /// Writes a place in world space to a `Transform`, and notes it as seen. What is not finite in
 /// its frame is not written.
-pub(crate) fn put(
+pub(crate) fn put<T: Placed>(
     transform: &mut Mut<Transform>,
-    state: &mut Mut<MarbleState>,
+    state: &mut Mut<T>,
     frame: &Frame,
     position: Option<Vec3>,
     rotation: Option<Quat>,
@@ -61,14 +62,14 @@ pub(crate) fn put(
         && bits(translation) != bits(transform.translation)
     {
         transform.translation = translation;
-        state.seen.translation = bits(translation);
+        state.see_translation(bits(translation));
     }
     if let Some(rotation) = rotation.map(|rotation| frame.turned(rotation))
         && rotation.is_finite()
         && rotation_bits(rotation) != rotation_bits(transform.rotation)
     {
         transform.rotation = rotation;
-        state.seen.rotation = rotation_bits(rotation);
+        state.see_rotation(rotation_bits(rotation));
     }
 }
 
@@ -126,20 +127,19 @@ pub fn marbles(
     }
 }
 
-/// Run condition: there are marbles that are children.
-pub fn any_child(marbles: Query<(), (With<Marble>, With<ChildOf>)>) -> bool {
-    !marbles.is_empty()
+/// Run condition: there are marbles, or bodies, that are children.
+pub(crate) fn any_child<T: Placed>(placed: Query<(), (With<T>, With<ChildOf>)>) -> bool {
+    !placed.is_empty()
 }
 
-/// Keeps marbles that are children where they are while their parents move between steps, unless
+type NotEased = Or<(Without<Eased>, With<NoTransformEasing>)>;
+
+/// Keeps marbles, or bodies, that are children where they are while their parents move between steps, unless
 /// somebody moved them, too. Those that are eased are drawn elsewhere.
-pub fn stay(
+pub(crate) fn stay<T: Placed>(
     world: Res<TawWorld>,
-    mut transforms: ParamSet<(TransformHelper, Query<(&mut Transform, &mut MarbleState)>)>,
-    children: Query<
-        (Entity, &ChildOf),
-        (With<Marble>, Or<(Without<Eased>, With<NoTransformEasing>)>),
-    >,
+    mut transforms: ParamSet<(TransformHelper, Query<(&mut Transform, &mut T)>)>,
+    children: Query<(Entity, &ChildOf), (With<T>, NotEased)>,
     mut frames: Local<Vec<(Entity, Frame)>>,
 ) {
     let helper = transforms.p0();
@@ -148,16 +148,15 @@ pub fn stay(
         let parent = helper.compute_global_transform(child_of.parent()).ok()?;
         Some((entity, Frame::new(&parent)?))
     }));
-    let mut marbles = transforms.p1();
+    let mut placed = transforms.p1();
     for (entity, frame) in &frames {
-        let Ok((mut transform, mut state)) = marbles.get_mut(*entity) else { continue };
-        let Some(row) = state.id.and_then(|id| world.marbles.row(id).ok()) else { continue };
-        if bits(transform.translation) == state.seen.translation {
-            let position = from_point(world.marbles.position()[row]);
+        let Ok((mut transform, mut state)) = placed.get_mut(*entity) else { continue };
+        let Some((position, rotation)) = state.place(&world) else { continue };
+        let (translation, turned) = state.seen();
+        if bits(transform.translation) == translation {
             put(&mut transform, &mut state, frame, Some(position), None);
         }
-        if rotation_bits(transform.rotation) == state.seen.rotation {
-            let rotation = world.marbles.rotation().get(row).copied().map(from_rotation);
+        if rotation_bits(transform.rotation) == turned {
             put(&mut transform, &mut state, frame, None, rotation);
         }
     }

@@ -269,6 +269,14 @@ impl<S: Scalar> Bodies<S> {
         })
     }
 
+    /// Distance of its surface from its center of mass, at most, in metres.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`].
+    pub fn reach(&self, id: BodyId) -> Result<S, Error> {
+        Ok(S::from_f64(self.states[self.row(id)?].reach))
+    }
+
     /// Mass properties along the axes of its frame; none of infinite mass.
     ///
     /// # Errors

@@ -7,9 +7,9 @@ use super::body_contacts::{BodyCandidate, MARGIN, grown};
 use crate::Error;
 use crate::body::{BodyContact, BodyPartner, BodyState, BodySystem, SolverBody};
 use crate::handle::NO_ROW;
-use crate::math::{Point3, Scalar, UnionFind, Vec3, cast_vector};
+use crate::math::{Point3, Scalar, UnionFind, Vec3, cast_point, cast_vector};
 use crate::motion::rest;
-use crate::shape::{Aabb, BoundedShape};
+use crate::shape::{Aabb, Aabb3, BoundedShape};
 
 /// Gravity and identity of the walls by which bodies fell asleep, and scratch memory.
 #[derive(Clone, Debug, Default)]
@@ -112,13 +112,36 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Wakes bodies where gravity or walls changed.
+    /// Wakes all bodies if gravity changed, and those near walls that did.
     fn wake_bodies_beside_changes(&mut self) {
-        let now = (Some(self.settings.gravity), self.walls.identity());
-        let scratch = &mut self.scratch.bodies;
-        if (scratch.gravity, scratch.walls) != now {
-            (scratch.gravity, scratch.walls) = now;
+        let gravity = Some(self.settings.gravity);
+        let walls = self.walls.identity();
+        let all = std::mem::replace(&mut self.scratch.bodies.gravity, gravity) != gravity;
+        let since = std::mem::replace(&mut self.scratch.bodies.walls, walls);
+        if all {
             self.bodies.states.iter_mut().for_each(BodyState::wake);
+        } else if since != walls {
+            self.wake_bodies_at_walls(since);
+        }
+    }
+
+    /// Wakes the bodies near walls that changed since these had this identity.
+    fn wake_bodies_at_walls(&mut self, since: u64) {
+        let mut regions: Vec<Aabb3<f64>> = Vec::new();
+        let cast =
+            |region: &Aabb3<S>| Aabb { min: cast_point(region.min), max: cast_point(region.max) };
+        let are_known =
+            self.walls.changes().visit_since(since, |region| regions.push(cast(region)));
+        regions.extend(self.walls.turning_regions().map(|region| cast(&region)));
+        for row in 0..self.bodies.states.len() {
+            let state = &self.bodies.states[row];
+            if !state.asleep {
+                continue;
+            }
+            let bounds = grown(&state.bounds(), MARGIN * state.reach);
+            if !are_known || regions.iter().any(|region| region.overlaps(&bounds)) {
+                self.bodies.wake_island(row);
+            }
         }
     }
 
@@ -127,24 +150,42 @@ impl<S: Scalar> World<S> {
         let states = &self.bodies.states;
         let gravity = cast_vector::<S, f64>(self.settings.gravity).magnitude();
         let is_fast = |speed: f64, reach: f64| speed > rest::sleep_speed(gravity, reach);
-        let stirs = |state: &BodyState<S>| {
-            let is_driven = !state.is_dynamic() && state.speed() > 0.0;
-            is_driven || !state.asleep && is_fast(state.speed(), state.reach)
+        let is_driven = |state: &BodyState<S>| !state.is_dynamic() && state.speed() > 0.0;
+        // What is heavy stirs what is light also where it is slow.
+        let stirs = |state: &BodyState<S>, inverse_mass: f64, reach: f64| {
+            let share = (inverse_mass / state.solver.inverse_mass).max(1.0);
+            is_driven(state) || !state.asleep && is_fast(state.speed() * share, reach)
         };
         let mut bodies = Vec::new();
         if states.iter().any(|state| state.asleep) {
             let tree = BodyCandidate::tree(candidates);
-            for near in candidates.iter().filter(|it| stirs(&states[it.row])) {
-                tree.for_each_in_box(&near.bounds, |row| bodies.push(row as usize));
+            for near in candidates.iter().filter(|it| states[it.row].speed() > 0.0) {
+                let state = &states[near.row];
+                tree.for_each_in_box(&near.bounds, |row| {
+                    let other = &states[row as usize];
+                    let meets = near.bounds.overlaps(&candidates[row as usize].bounds);
+                    if meets
+                        && stirs(state, other.solver.inverse_mass, other.reach.min(state.reach))
+                    {
+                        bodies.push(row as usize);
+                    }
+                });
             }
         }
         let mut balls = Vec::new();
         self.visit_balls_near_bodies(candidates, dt, |ball, row, _| {
-            let speed = cast_vector::<S, f64>(ball.velocity).magnitude();
-            if ball.is_asleep && stirs(&states[row]) {
-                balls.push(ball.row);
-            } else if !ball.is_asleep && is_fast(speed, ball.radius()) {
-                bodies.push(row);
+            let state = &states[row];
+            let radius = ball.radius();
+            if ball.is_asleep {
+                if stirs(state, ball.inverse_mass, radius) {
+                    balls.push(ball.row);
+                }
+            } else {
+                let speed = cast_vector::<S, f64>(ball.velocity).magnitude();
+                let share = (state.solver.inverse_mass / ball.inverse_mass).max(1.0);
+                if state.asleep && is_fast(speed * share, radius) {
+                    bodies.push(row);
+                }
             }
         });
         for row in balls {

@@ -227,6 +227,7 @@ impl<S: Scalar> World<S> {
                 let (a, first) = (&candidates[a as usize], &states[a as usize]);
                 let is_idle = |state: &BodyState<S>| state.asleep || !state.is_dynamic();
                 if a.row >= b.row
+                    || !a.bounds.overlaps(&b.bounds)
                     || is_idle(first) && is_idle(second)
                     || !first.body.layers.interacts_with(second.body.layers)
                     || !apart.is_empty() && self.are_joined(a.row, b.row, apart)
@@ -290,7 +291,10 @@ impl<S: Scalar> World<S> {
             if all.overlaps(&bounds) {
                 tree.for_each_in_box(&bounds, |row| {
                     let row = row as usize;
-                    if self.bodies.states[row].body.layers.interacts_with(ball.layers) {
+                    let layers = self.bodies.states[row].body.layers;
+                    if candidates[row].bounds.overlaps(&bounds)
+                        && layers.interacts_with(ball.layers)
+                    {
                         visit(&ball, row, way);
                     }
                 });

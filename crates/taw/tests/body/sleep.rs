@@ -170,3 +170,72 @@ fn a_kinematic_platform_that_creeps_does_not_freeze_what_lies_on_it() {
     let gap = place(&world, body).y - place(&world, platform).y;
     assert!((gap - 0.2).abs() < 2e-3, "{gap}");
 }
+
+/// A heavy ball, or box, that creeps pushes a light crate that sleeps, and is not stopped by it.
+#[test]
+fn what_is_heavy_and_slow_pushes_a_sleeper_away() {
+    for of_ball in [true, false] {
+        let mut world = world::<f32>(true);
+        world.walls.set_material(world.walls.id(0).unwrap(), Some(material(0.0, 0.0))).unwrap();
+        let light = BodyMass::Uniform(Mass::Kilograms(0.1));
+        let crate_ = Body { mass: light, ..cuboid([0.1, 0.1, 0.1], point(0.0, 0.1, 0.0)) };
+        let crate_ = world.bodies.insert(crate_).unwrap();
+        run(&mut world, 2.0);
+        assert!(world.bodies.is_asleep(crate_).unwrap());
+        let velocity = vector(0.04, 0.0, 0.0);
+        let at = point(-0.35, 0.2, 0.0);
+        if of_ball {
+            let mass = Mass::Kilograms(84.0);
+            let sleeping_disabled = true;
+            let marble = Marble { mass, velocity, sleeping_disabled, ..Marble::new(at, 0.2) };
+            world.marbles.insert(marble).unwrap();
+        } else {
+            let mass = BodyMass::Uniform(Mass::Kilograms(84.0));
+            let sleeping_disabled = true;
+            let material = material(0.0, 0.0);
+            let cuboid = cuboid([0.2, 0.2, 0.2], at);
+            let body = Body { mass, velocity, sleeping_disabled, material, ..cuboid };
+            world.bodies.insert(body).unwrap();
+        }
+        run(&mut world, 5.0);
+        let way = place(&world, crate_).x;
+        assert!((0.07..0.2).contains(&way), "of a ball: {of_ball}, {way}");
+    }
+}
+
+/// A body or a wall that turns far away keeps nobody awake.
+#[test]
+fn what_moves_far_away_keeps_nobody_awake() {
+    for of_wall in [false, true] {
+        let mut world = world::<f32>(true);
+        let at = point(50.0, 5.0, 0.0);
+        let half = vector(0.5, 0.1, 0.1);
+        let obb = |angle| Obb::new(at, about_z(angle), half).unwrap();
+        let wall = of_wall.then(|| world.walls.insert(obb(0.0)).unwrap());
+        if !of_wall {
+            let spinner = Body {
+                mass: BodyMass::Uniform(Mass::Infinite),
+                angular_velocity: vector(0.0, 0.0, 1.0),
+                ..Body::cuboid(half, at)
+            };
+            world.bodies.insert(spinner).unwrap();
+        }
+        let marble = world.marbles.insert(Marble::new(point(0.0, 0.1, 0.0), 0.1)).unwrap();
+        let body = world.bodies.insert(cuboid([0.1, 0.1, 0.1], point(1.0, 0.1, 0.0))).unwrap();
+        for step_number in 0..180 {
+            if let Some(wall) = wall {
+                let angle = f64::from(step_number) / 60.0;
+                world.walls.set(wall, obb(angle)).unwrap();
+                let motion = WallMotion {
+                    velocity: vector(0.0, 0.0, 0.0),
+                    angular_velocity: vector(0.0, 0.0, 1.0),
+                    pivot: at,
+                };
+                world.walls.set_motion(wall, Some(motion)).unwrap();
+            }
+            step(&mut world);
+        }
+        assert!(world.bodies.is_asleep(body).unwrap(), "of a wall: {of_wall}");
+        assert!(world.is_asleep(marble).unwrap(), "of a wall: {of_wall}");
+    }
+}

@@ -22,6 +22,8 @@ pub(crate) struct BallView<S> {
     /// Center and radius, in metres.
     pub at: Row<S>,
     pub velocity: Vec3<S>,
+    /// Inverse mass in 1/kg, also of one that sleeps.
+    pub inverse_mass: f64,
     pub is_asleep: bool,
     pub material: Material<S>,
     /// None of a kinematic marble, which passes through bodies.
@@ -51,6 +53,7 @@ impl<S: Scalar> Swarm<S> {
                 row,
                 at: *at,
                 velocity: xyz(velocity),
+                inverse_mass: velocity[3].abs().as_f64(),
                 is_asleep: velocity[3].is_sign_negative(),
                 material: surfaces.row(row as u32).material,
                 layers: surfaces.filter(row as u32).layers,
