@@ -32,6 +32,7 @@ fn motion_is_even_between_steps() {
 #[test]
 fn a_body_is_drawn_evenly_and_keeps_what_is_written_between_steps() {
     let (mut app, _) = app();
+    app.insert_resource(TawModel(Model::GAME));
     let body = (
         Body::from(Cuboid::new(0.2, 0.2, 0.2)),
         Velocity(Vec3::X / STEP),
