@@ -18,11 +18,11 @@ use crate::scatter::{Frame, put};
 ///
 /// It lies in the entity's own frame, and its [`Transform`] is its place: whoever writes one puts it there at once,
 /// with its velocity. It takes the components of a marble: [`Velocity`] (of the center of mass), [`AngularVelocity`],
-/// [`MarbleMass`] ([`MarbleMass::Infinite`] for a body that moves by its velocity alone), [`GravityScale`],
-/// [`MarbleDamping`], [`SurfaceMaterial`], [`CollisionLayers`], [`ExternalForce`] and [`ExternalImpulse`] (at the
-/// center of mass), [`SleepingDisabled`], and [`Sleeping`] to read. Its scale does not count.
+/// [`MarbleMass`](crate::components::MarbleMass) (infinite for a body that moves by its velocity alone), `GravityScale`,
+/// `MarbleDamping`, `SurfaceMaterial`, [`CollisionLayers`], `ExternalForce` and `ExternalImpulse` (at the center of
+/// mass), `SleepingDisabled`, and [`Sleeping`] to read. Its scale does not count.
 ///
-/// [`Disabled`](bevy::ecs::entity_disabling::Disabled), it is out of the world with its joints, and comes back as it
+/// While its entity is [`Disabled`](bevy::ecs::entity_disabling::Disabled), it is out of the world with its joints, and comes back as it
 /// was. [`TawWorld::restore`] brings it back to where it was, too.
 ///
 /// Bodies need [`Response::SoftStep`](taw::response::Response::SoftStep), the default. They are in no message of

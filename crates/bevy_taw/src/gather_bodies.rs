@@ -206,15 +206,14 @@ pub(crate) fn name(
     }
     let known: Vec<_> = world.body_entities.iter().map(|(id, entity)| (*id, *entity)).collect();
     for (id, entity) in known {
-        match bodies.get_mut(entity) {
-            Ok(mut state) => (state.id, state.away) = (Some(id), None),
-            Err(_) => {
-                world.body_entities.remove(&id);
-                if world.bodies.remove(id).is_ok() {
-                    log::warn!("taw took out {id:?}: no entity stands behind it");
-                    removed.write(RowRemoved::Body(id));
-                }
-            }
+        if let Ok(mut state) = bodies.get_mut(entity) {
+            (state.id, state.away) = (Some(id), None);
+            continue;
+        }
+        world.body_entities.remove(&id);
+        if world.bodies.remove(id).is_ok() {
+            log::warn!("taw took out {id:?}: no entity stands behind it");
+            removed.write(RowRemoved::Body(id));
         }
     }
 }

@@ -404,15 +404,14 @@ pub(crate) fn name(
     }
     let known: Vec<_> = world.joint_entities.iter().map(|(id, entity)| (*id, *entity)).collect();
     for (id, entity) in known {
-        match joints.get_mut(entity) {
-            Ok(mut state) => state.id = Some(id),
-            Err(_) => {
-                world.joint_entities.remove(&id);
-                if world.joints.remove(id).is_ok() {
-                    log::warn!("taw took out {id:?}: no entity stands behind it");
-                    removed.write(RowRemoved::Joint(id));
-                }
-            }
+        if let Ok(mut state) = joints.get_mut(entity) {
+            state.id = Some(id);
+            continue;
+        }
+        world.joint_entities.remove(&id);
+        if world.joints.remove(id).is_ok() {
+            log::warn!("taw took out {id:?}: no entity stands behind it");
+            removed.write(RowRemoved::Joint(id));
         }
     }
 }
