@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use taw::Error;
 use taw::frame::{AxisAngle, Camera, LookAt, Pose, Tree};
 use taw::math::Quat;
 use taw::motion::{Medium, WallMotion};
@@ -10,8 +9,8 @@ use taw::prelude::*;
 use taw::response::Elasticity;
 use taw::scene::{KinematicMotion, Simulation};
 use taw::shape::{Aabb, Aabb3, Capsule, Compound, HeightField, Hull, Mesh, Obb, Shape};
-use taw::swarm;
 use taw::world::{Damping, SpeedLimits};
+use taw::{Error, swarm};
 
 use super::{Place, Row, Scope};
 
