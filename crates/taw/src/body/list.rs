@@ -61,7 +61,7 @@ pub struct Bodies<S> {
     pub(crate) contacts: Vec<BodyContact>,
     /// Bodies that the last step stopped, since their motion overflowed.
     pub(crate) stopped: Vec<BodyId>,
-    /// Boxes about bodies that were taken out or changed since the last step: what slept on them has to look anew.
+    /// Boxes about bodies that were taken out or changed since the last step: balls that slept on them wake.
     pub(crate) vacated: Vec<Aabb3<f64>>,
 }
 
