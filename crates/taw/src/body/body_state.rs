@@ -33,6 +33,10 @@ pub(crate) struct BodyState<S> {
     pub rest_pose: Pose<f64>,
     pub rest_speed: f64,
     pub asleep: bool,
+    /// Box about it while it sleeps.
+    asleep_in: Option<Aabb3<f64>>,
+    /// Force in N and torque in N m by balls and bodies with which it sleeps.
+    load: Option<[Vec3<f64>; 2]>,
 }
 
 impl<S: Scalar> BodyState<S> {
@@ -60,6 +64,8 @@ impl<S: Scalar> BodyState<S> {
             rest_pose: Pose::identity(),
             rest_speed: 0.0,
             asleep: false,
+            asleep_in: None,
+            load: None,
             body,
         };
         state.set_pose(Pose {
@@ -89,6 +95,9 @@ impl<S: Scalar> BodyState<S> {
 
     /// Box about it in the world.
     pub fn bounds(&self) -> Aabb3<f64> {
+        if let Some(bounds) = self.asleep_in {
+            return bounds;
+        }
         let boxes = (0..self.parts.len()).map(|part| self.part(part).bounding_box());
         let center = Aabb3 { min: self.solver.center(), max: self.solver.center() };
         boxes.reduce(|all, next| all.union(&next)).unwrap_or(center)
@@ -104,9 +113,15 @@ impl<S: Scalar> BodyState<S> {
         self.solver.inverse_mass > 0.0
     }
 
+    /// True if it moves by nothing: it sleeps, or is a kinematic body without a velocity.
+    pub fn is_still(&self) -> bool {
+        self.asleep || !self.is_dynamic() && self.speed() == 0.0
+    }
+
     /// Wakes it.
     pub fn wake(&mut self) {
         (self.rest, self.asleep) = (rest::MOVES, false);
+        (self.asleep_in, self.load) = (None, None);
     }
 
     /// Speed of its surface, at most, in m/s.
@@ -136,9 +151,17 @@ impl<S: Scalar> BodyState<S> {
         rest::lasts(self.rest, self.reach, gravity * self.body.gravity_scale.as_f64().abs())
     }
 
+    /// Notes the force in N and the torque in N m on it while it sleeps. Returns the acceleration of its surface, at
+    /// most, by what changed of them since it fell asleep, in m/s².
+    pub fn note_load(&mut self, load: [Vec3<f64>; 2]) -> f64 {
+        let [force, torque] = *self.load.get_or_insert(load);
+        let turn = self.solver.inverse_inertia * (load[1] - torque);
+        (load[0] - force).magnitude() * self.solver.inverse_mass + turn.magnitude() * self.reach
+    }
+
     /// Falls asleep.
     pub fn fall_asleep(&mut self) {
-        self.asleep = true;
+        (self.asleep, self.asleep_in) = (true, Some(self.bounds()));
         self.solver.stop();
     }
 
@@ -165,9 +188,7 @@ fn reach_of(shape: &Shape<f64>) -> f64 {
     if let Some(ball) = as_convex(shape).and_then(Convex::as_sphere) {
         return ball.center.to_vec().magnitude() + ball.radius;
     }
-    let Aabb3 { min, max } = shape.bounding_box();
-    let far = |axis: usize| min[axis].abs().max(max[axis].abs());
-    Vec3::new(far(0), far(1), far(2)).magnitude()
+    shape.bounding_box().farthest_distance(Point3::origin())
 }
 
 pub(super) fn cast_rotation<S: Scalar, T: Scalar>(Quat { s, v }: Quat<S>) -> Quat<T> {

@@ -70,7 +70,8 @@ impl BodyContact {
             let excess = more * (part - 1.0);
             bodies[a].apply(-excess, point.arms[0]);
             bodies[b].apply(excess, point.arms[1]);
-            point.total += point.impulse.normal;
+            let made = point.impulse.plus(ContactImpulse::split(excess, self.normal));
+            point.total = point.total.plus(made);
             point.impulse = load;
         }
         true

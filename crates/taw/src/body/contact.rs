@@ -40,6 +40,8 @@ pub(crate) struct BodyContact {
     pub material: ContactMaterial<f64>,
     /// Radii around the cores of both parts, in metres; zero of polyhedra.
     pub radii: [f64; 2],
+    /// True from when it first bears something until a gap opens.
+    pub touches: bool,
     pub points: SmallVec<[BodyContactPoint; 4]>,
 }
 
@@ -60,8 +62,11 @@ pub(crate) struct BodyContactPoint {
     pub impulse: ContactImpulse<f64>,
     /// Speed along the normal before contacts were solved in the substep, in m/s; negative of an approach.
     pub approach: f64,
-    /// Sum of the normal impulses of the step, in N s.
-    pub total: f64,
+    /// Impulse of the step, in N s.
+    pub total: ContactImpulse<f64>,
+    /// Largest approach speed along the normal in the step, before contacts are solved, and the speed of the slip
+    /// then, in m/s.
+    pub fastest: [f64; 2],
     /// Point on the partner's surface where contacts were found.
     pub place: Vec3<f64>,
 }
@@ -99,6 +104,7 @@ pub(crate) fn manifold_contact(
         normal,
         material,
         radii,
+        touches: false,
         points: manifold.points.iter().map(point).collect(),
     }
 }
@@ -111,7 +117,8 @@ pub(crate) fn ball_contact(
     material: ContactMaterial<f64>,
 ) -> BodyContact {
     let points = [BodyContactPoint::new([Vec3::zero(); 2])].into_iter().collect();
-    BodyContact { key, bodies, normal: Vec3::unit_y(), material, radii: [radius, 0.0], points }
+    let (normal, radii) = (Vec3::unit_y(), [radius, 0.0]);
+    BodyContact { key, bodies, normal, material, radii, touches: false, points }
 }
 
 impl BodyContactPoint {
@@ -124,13 +131,19 @@ impl BodyContactPoint {
             separation: 0.0,
             impulse: ContactImpulse::zero(),
             approach: 0.0,
-            total: 0.0,
+            total: ContactImpulse::zero(),
+            fastest: [f64::NEG_INFINITY, 0.0],
             place: Vec3::zero(),
         }
     }
 }
 
 impl BodyContact {
+    /// Separation of its nearest points, in metres.
+    pub fn separation(&self) -> f64 {
+        self.points.iter().map(|point| point.separation).fold(f64::INFINITY, f64::min)
+    }
+
     /// Returns true if it is one of a body.
     pub fn is_of(&self, id: BodyId) -> bool {
         self.key.body == id || self.key.partner == BodyPartner::Body(id)
@@ -168,6 +181,7 @@ impl BodyContact {
 
     /// Takes over the impulses of the last step's contact of these parts.
     pub fn take_impulses(&mut self, before: &Self) {
+        self.touches = before.touches;
         for point in &mut self.points {
             let known = before.points.iter().find(|known| known.feature == point.feature);
             if let Some(known) = known {

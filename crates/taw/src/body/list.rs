@@ -61,12 +61,12 @@ pub struct Bodies<S> {
     pub(crate) contacts: Vec<BodyContact>,
     /// Bodies that the last step stopped, since their motion overflowed.
     pub(crate) stopped: Vec<BodyId>,
-    /// Boxes about bodies that were taken out or changed since the last step: balls that slept on them wake.
-    pub(crate) vacated: Vec<Aabb3<f64>>,
+    /// Boxes about bodies that came, went or changed since the last step, before and after: what sleeps there wakes.
+    pub(crate) changed_regions: Vec<Aabb3<f64>>,
 }
 
 impl<S: Scalar> Bodies<S> {
-    /// Adds a body.
+    /// Adds a body. What sleeps where it is wakes.
     ///
     /// # Errors
     /// [`Error::NotFinite`], [`Error::NotPositive`], [`Error::NotUnit`] or [`Error::OutOfRange`] for its numbers;
@@ -75,11 +75,12 @@ impl<S: Scalar> Bodies<S> {
     pub fn insert(&mut self, body: Body<S>) -> Result<BodyId, Error> {
         let state = BodyState::new(body.validated()?)?;
         let id = BodyId(self.handles.push()?);
+        self.changed_regions.push(state.bounds());
         self.states.push(state);
         Ok(id)
     }
 
-    /// Changes a body: its place, motion, shape, mass, kind. It wakes.
+    /// Changes a body: its place, motion, shape, mass, kind. It wakes, and what sleeps beside it.
     ///
     /// # Errors
     /// [`Error::NoSuchBody`], and those of [`Self::insert`].
@@ -87,7 +88,7 @@ impl<S: Scalar> Bodies<S> {
         let row = self.row(id)?;
         let state = BodyState::new(body.validated()?)?;
         self.wake_beside(id);
-        self.vacated.push(self.states[row].bounds());
+        self.changed_regions.extend([self.states[row].bounds(), state.bounds()]);
         let before = &self.states[row].body;
         if (&before.shape, before.mass) != (&state.body.shape, state.body.mass) {
             self.contacts.retain(|contact| !contact.is_of(id)); // their impulses were for another one
@@ -104,7 +105,7 @@ impl<S: Scalar> Bodies<S> {
         let row = self.row(id)?;
         let body = self.states[row].now();
         self.wake_beside(id);
-        self.vacated.push(self.states[row].bounds());
+        self.changed_regions.push(self.states[row].bounds());
         self.contacts.retain(|contact| !contact.is_of(id));
         self.handles.swap_remove(id.0);
         self.states.swap_remove(row);
@@ -139,12 +140,13 @@ impl<S: Scalar> Bodies<S> {
         super::place(Point3::from_vec(translation))?;
         self.wake_beside(id);
         let state = &mut self.states[row];
-        self.vacated.push(state.bounds());
+        let before = state.bounds();
         state.wake();
         state.set_pose(Pose {
             rotation: cast_rotation(rotation),
             translation: cast_vector(translation),
         });
+        self.changed_regions.extend([before, state.bounds()]);
         Ok(())
     }
 

@@ -83,7 +83,12 @@ impl BodyContact {
     pub(super) fn note_approach(&mut self, bodies: &[SolverBody]) {
         for at in 0..self.points.len() {
             let relative = self.relative_velocity(&self.points[at], bodies);
-            self.points[at].approach = relative.dot(self.normal);
+            let approach = relative.dot(self.normal);
+            let point = &mut self.points[at];
+            point.approach = approach;
+            if -approach > point.fastest[0] {
+                point.fastest = [-approach, (relative - self.normal * approach).magnitude()];
+            }
         }
     }
 

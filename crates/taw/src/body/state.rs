@@ -4,7 +4,7 @@ use cgmath::{EuclideanSpace, InnerSpace, Matrix, SquareMatrix, Zero};
 
 use crate::frame::Pose;
 use crate::handle::NO_ROW;
-use crate::math::{Mat3, Point3, Quat, Scalar, Vec3};
+use crate::math::{Mat3, Point3, Quat, Scalar, Vec3, cast_vector, is_finite};
 use crate::motion::{FreeRotation, WallMotion, integrate_rotation};
 use crate::shape::MassProperties;
 
@@ -217,8 +217,10 @@ impl SolverBody {
 
     /// Returns true if all its numbers are finite in a scalar.
     pub fn is_finite_in<S: Scalar>(&self) -> bool {
-        let sum = self.pose.translation + self.velocity + self.spin + self.pose.rotation.v;
-        S::from_f64(sum.x + sum.y + sum.z + self.pose.rotation.s).is_finite()
+        let Pose { rotation, translation } = self.pose;
+        let are_finite = |v: Vec3<f64>| is_finite(cast_vector::<f64, S>(v));
+        [translation, rotation.v, self.velocity, self.spin].into_iter().all(are_finite)
+            && rotation.s.is_finite()
     }
 }
 

@@ -99,7 +99,7 @@ impl BodySystem {
         self.update_contacts(h);
         self.pass(false);
         for point in self.contacts.iter_mut().flat_map(|contact| &mut contact.points) {
-            point.total += point.impulse.normal;
+            point.total = point.total.plus(point.impulse);
         }
     }
 
@@ -154,7 +154,7 @@ impl BodySystem {
 impl BodyContact {
     /// Returns true if it bore something in this step.
     pub fn bore(&self) -> bool {
-        self.points.iter().any(|point| point.total > 0.0)
+        self.points.iter().any(|point| point.total.normal > 0.0)
     }
 
     /// Returns true if it bears something in this substep.

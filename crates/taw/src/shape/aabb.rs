@@ -76,6 +76,12 @@ fn smaller<S: Scalar>(a: S, b: S) -> S {
 }
 
 impl<S: Scalar> Aabb3<S> {
+    /// Distance of its farthest corner from a point, in metres.
+    pub(crate) fn farthest_distance(&self, point: Point3<S>) -> S {
+        let [low, high] = [self.min, self.max].map(|corner| (corner - point).map(S::abs));
+        length(low.zip(high, S::max))
+    }
+
     /// Converts to an oriented box.
     #[must_use]
     pub fn obb(&self) -> Obb<S> {

@@ -3,13 +3,17 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::World;
-use super::body_contacts::{BodyCandidate, MARGIN, grown};
+use super::body_contacts::{BodyCandidates, MARGIN, NearBall, grown};
 use crate::Error;
 use crate::body::{BodyContact, BodyPartner, BodyState, BodySystem, SolverBody};
+use crate::contact::touch_goes_on;
 use crate::handle::NO_ROW;
-use crate::math::{Point3, Scalar, UnionFind, Vec3, cast_point, cast_vector};
+use crate::math::{Scalar, UnionFind, Vec3, cast_point, cast_vector};
 use crate::motion::rest;
-use crate::shape::{Aabb, Aabb3, BoundedShape};
+use crate::shape::{Aabb, Aabb3, Bvh};
+
+/// Acceleration of the surface of a sleeper by a change of its load, over gravity, from which on it wakes.
+const LOAD: f64 = 0.05;
 
 /// Gravity and identity of the walls by which bodies fell asleep, and scratch memory.
 #[derive(Clone, Debug, Default)]
@@ -34,12 +38,11 @@ impl<S: Scalar> World<S> {
     /// Gives bodies and their contacts to the solver for a step of `dt` seconds.
     pub(super) fn give_bodies(&mut self, dt: S) {
         self.bodies.stopped.clear();
-        self.wake_balls_of_vacated_boxes();
+        self.wake_at_changed_bodies();
         if self.bodies.is_empty() {
             return;
         }
         self.wake_bodies_beside_changes();
-        self.wake_bodies_that_balls_left();
         for id in &self.scratch.soft_step.jointed.rigid {
             if let Ok(row) = self.bodies.row(*id) {
                 self.bodies.states[row].wake(); // what is joined does not sleep
@@ -84,23 +87,22 @@ impl<S: Scalar> World<S> {
         self.bodies.stopped = stopped.into_iter().filter_map(|row| self.bodies.id(row)).collect();
         let stopped = &self.bodies.stopped;
         contacts.retain(|contact| !stopped.iter().any(|id| contact.is_of(*id)));
+        self.note_touches(&mut contacts, dt.as_f64());
         self.keep_contacts(contacts);
+        self.wake_loaded_bodies(dt.as_f64());
         self.update_body_sleep(&lies, dt);
     }
 
     /// Remembers contacts, those of sleepers too, which were not looked for.
     fn keep_contacts(&mut self, contacts: Vec<BodyContact>) {
         let before = std::mem::replace(&mut self.bodies.contacts, contacts);
-        // A kinematic body bears sleepers, too.
-        let sleeps = |id| {
-            let rests = |state: &BodyState<S>| state.asleep || !state.is_dynamic();
-            self.bodies.row(id).is_ok_and(|row| rests(&self.bodies.states[row]))
-        };
+        let is_still =
+            |id| self.bodies.row(id).is_ok_and(|row| self.bodies.states[row].is_still());
         let slept = |contact: &BodyContact| {
-            sleeps(contact.key.body)
+            is_still(contact.key.body)
                 && match contact.key.partner {
-                    BodyPartner::Body(other) => sleeps(other),
-                    BodyPartner::Ball(ball) => self.swarm.row(ball).is_ok(),
+                    BodyPartner::Body(other) => is_still(other),
+                    BodyPartner::Ball(ball) => self.swarm.is_asleep(ball),
                     BodyPartner::Wall(wall) => self.walls.row(wall).is_ok(),
                 }
         };
@@ -146,7 +148,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Wakes bodies that others come near to, and balls that bodies do. Returns true if a body woke.
-    pub(super) fn wake_disturbed_bodies(&mut self, candidates: &[BodyCandidate], dt: f64) -> bool {
+    pub(super) fn wake_disturbed_bodies(&mut self, candidates: &BodyCandidates<S>) -> bool {
         let states = &self.bodies.states;
         let gravity = cast_vector::<S, f64>(self.settings.gravity).magnitude();
         let is_fast = |speed: f64, reach: f64| speed > rest::sleep_speed(gravity, reach);
@@ -158,40 +160,35 @@ impl<S: Scalar> World<S> {
         };
         let mut bodies = Vec::new();
         if states.iter().any(|state| state.asleep) {
-            let tree = BodyCandidate::tree(candidates);
-            for near in candidates.iter().filter(|it| states[it.row].speed() > 0.0) {
+            for near in candidates.list.iter().filter(|it| states[it.row].speed() > 0.0) {
                 let state = &states[near.row];
-                tree.for_each_in_box(&near.bounds, |row| {
-                    let other = &states[row as usize];
-                    let meets = near.bounds.overlaps(&candidates[row as usize].bounds);
-                    if meets
-                        && stirs(state, other.solver.inverse_mass, other.reach.min(state.reach))
-                    {
-                        bodies.push(row as usize);
+                candidates.for_each_in_box(&near.bounds, |other| {
+                    let BodyState { solver, reach, asleep, .. } = &states[other.row];
+                    if *asleep && stirs(state, solver.inverse_mass, reach.min(state.reach)) {
+                        bodies.push(other.row);
                     }
                 });
             }
         }
         let mut balls = Vec::new();
-        self.visit_balls_near_bodies(candidates, dt, |ball, row, _| {
-            let state = &states[row];
+        for NearBall { ball, row, .. } in &candidates.balls {
+            let state = &states[*row];
             let radius = ball.radius();
             if ball.is_asleep {
                 if stirs(state, ball.inverse_mass, radius) {
                     balls.push(ball.row);
                 }
-            } else {
+            } else if state.asleep {
                 let speed = cast_vector::<S, f64>(ball.velocity).magnitude();
                 let share = (state.solver.inverse_mass / ball.inverse_mass).max(1.0);
-                if state.asleep && is_fast(speed * share, radius) {
-                    bodies.push(row);
+                if is_fast(speed * share, radius) {
+                    bodies.push(*row);
                 }
             }
-        });
+        }
         for row in balls {
             self.swarm.wake_row(row);
         }
-        bodies.retain(|row| self.bodies.states[*row].asleep);
         let any = !bodies.is_empty();
         for row in bodies {
             self.bodies.wake_island(row);
@@ -199,43 +196,81 @@ impl<S: Scalar> World<S> {
         any
     }
 
-    /// Wakes the balls that were near bodies that were taken out or changed.
-    fn wake_balls_of_vacated_boxes(&mut self) {
-        let vacated = std::mem::take(&mut self.bodies.vacated);
-        if vacated.is_empty() {
+    /// Wakes the bodies and balls where bodies came, went or changed.
+    fn wake_at_changed_bodies(&mut self) {
+        let regions = std::mem::take(&mut self.bodies.changed_regions);
+        if regions.is_empty() {
             return;
         }
-        let mut balls = Vec::new();
-        self.swarm.visit_balls(|ball| {
+        let tree = Bvh::new(&regions);
+        let is_near = |bounds: &Aabb3<f64>| {
+            let mut any = false;
+            tree.for_each_in_box(bounds, |at| any |= regions[at as usize].overlaps(bounds));
+            any
+        };
+        let balls = self.swarm.ball_views().filter(|ball| {
             let center = Aabb { min: ball.center(), max: ball.center() };
-            let bounds = grown(&center, ball.radius() * (1.0 + MARGIN));
-            if ball.is_asleep && vacated.iter().any(|left| left.overlaps(&bounds)) {
-                balls.push(ball.row);
-            }
+            ball.is_asleep && is_near(&grown(&center, ball.radius() * (1.0 + MARGIN)))
         });
+        let balls: Vec<_> = balls.map(|ball| ball.row).collect();
         for row in balls {
             self.swarm.wake_row(row);
         }
+        for row in 0..self.bodies.states.len() {
+            let state = &self.bodies.states[row];
+            if state.asleep && is_near(&grown(&state.bounds(), MARGIN * state.reach)) {
+                self.bodies.wake_island(row);
+            }
+        }
     }
 
-    /// Wakes bodies that slept on balls which were taken out or moved away.
-    fn wake_bodies_that_balls_left(&mut self) {
-        let left = |contact: &&BodyContact| {
-            let BodyPartner::Ball(ball) = contact.key.partner else { return false };
-            let Ok(body) = self.bodies.row(contact.key.body) else { return false };
-            let state = &self.bodies.states[body];
-            if !state.asleep || !contact.presses() {
-                return false;
+    /// Notes which contacts touch: from when they first bear something, until a gap opens.
+    fn note_touches(&self, contacts: &mut [BodyContact], dt: f64) {
+        let h = dt / f64::from(self.settings.model.substeps.max(1));
+        let fall = cast_vector::<S, f64>(self.settings.gravity).magnitude() * h * h;
+        let reach = |row: u32| self.bodies.states.get(row as usize).map(|state| state.reach);
+        for contact in contacts {
+            let [partner, body] = contact.bodies.map(reach);
+            let partner = match contact.key.partner {
+                BodyPartner::Ball(_) => Some(contact.radii[0]),
+                _ => partner, // walls are larger than bodies
+            };
+            let smaller = partner.into_iter().chain(body).fold(f64::INFINITY, f64::min);
+            let goes_on = touch_goes_on(contact.separation(), smaller, fall);
+            contact.touches = contact.bore() || contact.touches && goes_on;
+        }
+    }
+
+    /// Wakes sleepers on which balls and bodies press otherwise than when they fell asleep.
+    fn wake_loaded_bodies(&mut self, dt: f64) {
+        if !self.bodies.states.iter().any(|state| state.asleep) {
+            return;
+        }
+        let mut loads = vec![[Vec3::zero(); 2]; self.bodies.len()];
+        for contact in &self.bodies.contacts {
+            let partner = match contact.key.partner {
+                BodyPartner::Wall(_) => continue, // its force is the sum of all others
+                BodyPartner::Ball(_) => None,
+                BodyPartner::Body(id) => self.bodies.row(id).ok(),
+            };
+            let body = self.bodies.row(contact.key.body).ok();
+            for point in &contact.points {
+                let force = point.total.along(contact.normal) / dt;
+                for (row, arm, force) in [(partner, 0, -force), (body, 1, force)] {
+                    if let Some([sum, torque]) = row.and_then(|row| loads.get_mut(row)) {
+                        *sum += force;
+                        *torque += point.arms[arm].cross(force);
+                    }
+                }
             }
-            let Ok(row) = self.swarm.row(ball) else { return true };
-            let [x, y, z, radius] = self.swarm.balls()[row].map(S::as_f64);
-            let local = state.solver.pose.inverse_transform_point(Point3::new(x, y, z));
-            let part = &state.parts[contact.key.parts[1] as usize];
-            part.project_point(local).distance > radius * (1.0 + MARGIN)
-        };
-        let left: Vec<_> = self.bodies.contacts.iter().filter(left).map(|it| it.key.body).collect();
-        for row in left.into_iter().filter_map(|id| self.bodies.row(id).ok()).collect::<Vec<_>>() {
-            self.bodies.wake_island(row);
+        }
+        let gravity = cast_vector::<S, f64>(self.settings.gravity).magnitude();
+        for (row, load) in loads.into_iter().enumerate() {
+            let state = &mut self.bodies.states[row];
+            let pull = gravity * state.body.gravity_scale.as_f64().abs();
+            if state.asleep && state.note_load(load) > LOAD * pull {
+                self.bodies.wake_island(row);
+            }
         }
     }
 

@@ -35,18 +35,35 @@ pub(super) struct BodyCandidate {
     pub bounds: Aabb3<f64>,
 }
 
+/// Ball that may come near a body.
+pub(super) struct NearBall<S> {
+    pub ball: BallView<S>,
+    /// Row of the body.
+    pub row: usize,
+    /// Distance that the ball goes in the step, at most, with its slack, in metres.
+    way: f64,
+}
+
+/// Bodies with the boxes in which they stay in a step, and the balls near these.
+pub(super) struct BodyCandidates<S> {
+    pub list: Vec<BodyCandidate>,
+    tree: Bvh<f64>,
+    pub balls: Vec<NearBall<S>>,
+}
+
+impl<S> BodyCandidates<S> {
+    /// Visits those whose boxes overlap this one.
+    pub fn for_each_in_box(&self, bounds: &Aabb3<f64>, mut visit: impl FnMut(&BodyCandidate)) {
+        self.tree.for_each_in_box(bounds, |row| {
+            let candidate = &self.list[row as usize];
+            if candidate.bounds.overlaps(bounds) {
+                visit(candidate); // the tree visits some others, too
+            }
+        });
+    }
+}
+
 impl BodyCandidate {
-    fn list<S: Scalar>(states: &[BodyState<S>], dt: f64) -> Vec<Self> {
-        let rows = states.iter().enumerate();
-        rows.map(|(row, state)| Self::new(row, state, dt)).collect()
-    }
-
-    /// Tree of their boxes.
-    pub fn tree(candidates: &[Self]) -> Bvh<f64> {
-        let boxes: Vec<_> = candidates.iter().map(|candidate| candidate.bounds).collect();
-        Bvh::new(&boxes)
-    }
-
     fn new<S: Scalar>(row: usize, state: &BodyState<S>, dt: f64) -> Self {
         let SolverBody { velocity, spin, acceleration, .. } = state.solver;
         let turn = (spin.magnitude() * dt).min(std::f64::consts::PI) * state.reach;
@@ -74,9 +91,9 @@ impl<S: Scalar> World<S> {
     /// Finds the contacts of bodies that are awake, for a step of `dt` seconds.
     pub(super) fn find_body_contacts(&mut self, dt: S) -> BodySystem {
         let step = dt.as_f64();
-        let mut candidates = BodyCandidate::list(&self.bodies.states, step);
-        while self.wake_disturbed_bodies(&candidates, step) {
-            candidates = BodyCandidate::list(&self.bodies.states, step);
+        let mut candidates = self.body_candidates(step);
+        while self.wake_disturbed_bodies(&candidates) {
+            candidates = self.body_candidates(step);
         }
         let states = &self.bodies.states;
         let apart = self.joints.ignored_bodies();
@@ -84,9 +101,9 @@ impl<S: Scalar> World<S> {
             states.iter().map(BodyState::in_solver).collect(),
             states.iter().map(|state| state.parts.clone()).collect(),
         );
-        self.collide_bodies_with_walls(&candidates, step, &mut system);
+        self.collide_bodies_with_walls(&candidates.list, step, &mut system);
         self.collide_bodies(&candidates, (step, &apart), &mut system);
-        self.collide_bodies_with_balls(&candidates, (step, &apart), &mut system);
+        self.collide_bodies_with_balls(&candidates, &apart, &mut system);
         system.contacts.sort_by_key(|contact| contact.key);
         let before = &self.bodies.contacts;
         for contact in &mut system.contacts {
@@ -104,7 +121,7 @@ impl<S: Scalar> World<S> {
         system: &mut BodySystem,
     ) {
         let mut index_of_wall = BTreeMap::new();
-        let farthest = self.farthest_wall_way(dt);
+        let moved = self.moved_walls(dt);
         for candidate in candidates {
             let state = &self.bodies.states[candidate.row];
             if state.asleep || !state.is_dynamic() {
@@ -121,8 +138,10 @@ impl<S: Scalar> World<S> {
                 max: cast_point(candidate.bounds.max),
             };
             self.walls.for_each_colliding(&bounds, filter, |part| near.push(part));
-            if farthest > 0.0 {
-                let beyond = grown(&candidate.bounds, farthest);
+            let near_moved = moved.iter().filter(|(swept, _)| swept.overlaps(&candidate.bounds));
+            let way = near_moved.map(|(_, way)| *way).fold(0.0, f64::max);
+            if way > 0.0 {
+                let beyond = grown(&candidate.bounds, way);
                 let bounds = Aabb { min: cast_point(beyond.min), max: cast_point(beyond.max) };
                 self.walls.for_each_colliding(&bounds, filter, |part| {
                     if self.walls.has_moved(part.wall as usize) {
@@ -151,16 +170,19 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Longest way of a point of a wall that moves, in a step of `dt` seconds, at most; in metres.
-    fn farthest_wall_way(&self, dt: f64) -> f64 {
-        let rows = 0..self.walls.len();
-        let ways = rows.filter(|row| self.walls.has_moved(*row)).filter_map(|row| {
+    /// Boxes in which walls that move stay in a step of `dt` seconds, and the longest way of their points, at most, in
+    /// metres.
+    fn moved_walls(&self, dt: f64) -> Vec<(Aabb3<f64>, f64)> {
+        let rows = (0..self.walls.len()).filter(|row| self.walls.has_moved(*row));
+        let swept = rows.filter_map(|row| {
             let motion = self.walls.motion_of_row(row)?;
             let bounds = self.walls.shapes()[row].bounding_box()?;
-            let reach = [bounds.min, bounds.max].map(|at| (at - motion.pivot).magnitude().as_f64());
-            Some(way_of_wall(&motion.cast(), 2.0 * reach[0].max(reach[1]), dt))
+            let reach = bounds.farthest_distance(motion.pivot).as_f64();
+            let way = way_of_wall(&motion.cast(), reach, dt);
+            let bounds = Aabb { min: cast_point(bounds.min), max: cast_point(bounds.max) };
+            Some((grown(&bounds, way), way))
         });
-        ways.fold(0.0, f64::max)
+        swept.collect()
     }
 
     /// Part of a wall where it is when a step of `dt` seconds begins.
@@ -215,19 +237,17 @@ impl<S: Scalar> World<S> {
 
     fn collide_bodies(
         &self,
-        candidates: &[BodyCandidate],
+        candidates: &BodyCandidates<S>,
         (dt, apart): (f64, &BTreeSet<[JointHeld; 2]>),
         system: &mut BodySystem,
     ) {
-        let tree = BodyCandidate::tree(candidates);
         let states = &self.bodies.states;
-        for b in candidates {
+        for b in &candidates.list {
             let second = &states[b.row];
-            tree.for_each_in_box(&b.bounds, |a| {
-                let (a, first) = (&candidates[a as usize], &states[a as usize]);
+            candidates.for_each_in_box(&b.bounds, |a| {
+                let first = &states[a.row];
                 let is_idle = |state: &BodyState<S>| state.asleep || !state.is_dynamic();
                 if a.row >= b.row
-                    || !a.bounds.overlaps(&b.bounds)
                     || is_idle(first) && is_idle(second)
                     || !first.body.layers.interacts_with(second.body.layers)
                     || !apart.is_empty() && self.are_joined(a.row, b.row, apart)
@@ -246,8 +266,10 @@ impl<S: Scalar> World<S> {
     }
 
     fn collide_pair(&self, pair: [&BodyCandidate; 2], dt: f64, system: &mut BodySystem) {
-        let [first, second] = pair.map(|it| &self.bodies.states[it.row]);
         let [Some(a), Some(b)] = pair.map(|it| self.bodies.id(it.row)) else { return };
+        // Rows move about; the order of handles does not.
+        let (pair, [a, b]) = if a < b { (pair, [a, b]) } else { ([pair[1], pair[0]], [b, a]) };
+        let [first, second] = pair.map(|it| &self.bodies.states[it.row]);
         let margin = pair[0].margin + pair[1].margin;
         let reach = ContactReach { margin, slack: pair[0].slack.min(pair[1].slack), dt };
         let material = first.body.material.combined_with(second.body.material).cast();
@@ -271,46 +293,44 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Visits balls and the bodies near which they come in `dt` seconds, with how far each ball goes in it.
-    pub(super) fn visit_balls_near_bodies(
-        &self,
-        candidates: &[BodyCandidate],
-        dt: f64,
-        mut visit: impl FnMut(&BallView<S>, usize, f64),
-    ) {
-        let Some(all) = candidates.iter().map(|it| it.bounds).reduce(|all, it| all.union(&it))
-        else {
-            return;
-        };
-        let tree = BodyCandidate::tree(candidates);
-        self.swarm.visit_balls(|ball| {
+    /// Bodies, and the balls near which they come, in a step of `dt` seconds.
+    fn body_candidates(&self, dt: f64) -> BodyCandidates<S> {
+        let states = &self.bodies.states;
+        let rows = states.iter().enumerate();
+        let list: Vec<_> = rows.map(|(row, state)| BodyCandidate::new(row, state, dt)).collect();
+        let boxes: Vec<_> = list.iter().map(|candidate| candidate.bounds).collect();
+        let mut all = BodyCandidates { list, tree: Bvh::new(&boxes), balls: Vec::new() };
+        let Some(bounds_of_all) = all.tree.bounds() else { return all };
+        let mut balls = Vec::new();
+        for ball in self.swarm.ball_views() {
             let speed = cast_vector::<S, f64>(ball.velocity).magnitude();
             let way = speed * dt + MARGIN * ball.radius();
-            let bounds =
-                grown(&Aabb { min: ball.center(), max: ball.center() }, ball.radius() + way);
-            if all.overlaps(&bounds) {
-                tree.for_each_in_box(&bounds, |row| {
-                    let row = row as usize;
-                    let layers = self.bodies.states[row].body.layers;
-                    if candidates[row].bounds.overlaps(&bounds)
-                        && layers.interacts_with(ball.layers)
-                    {
-                        visit(&ball, row, way);
+            let center = Aabb { min: ball.center(), max: ball.center() };
+            let bounds = grown(&center, ball.radius() + way);
+            if bounds_of_all.overlaps(&bounds) {
+                all.for_each_in_box(&bounds, |near| {
+                    if states[near.row].body.layers.interacts_with(ball.layers) {
+                        balls.push(NearBall { ball, row: near.row, way });
                     }
                 });
             }
-        });
+        }
+        all.balls = balls;
+        all
     }
 
     fn collide_bodies_with_balls(
         &self,
-        candidates: &[BodyCandidate],
-        (dt, apart): (f64, &BTreeSet<[JointHeld; 2]>),
+        candidates: &BodyCandidates<S>,
+        apart: &BTreeSet<[JointHeld; 2]>,
         system: &mut BodySystem,
     ) {
-        self.visit_balls_near_bodies(candidates, dt, |ball, row, way| {
+        for &NearBall { ref ball, row, way } in &candidates.balls {
             let state = &self.bodies.states[row];
-            let Some(body) = self.bodies.id(row) else { return };
+            let Some(body) = self.bodies.id(row) else { continue };
+            if ball.is_asleep && state.is_still() {
+                continue; // their contact is kept
+            }
             let marble = || {
                 let slots = &self.scratch.soft_step.marble_of_slot;
                 self.marbles.id(*slots.get(ball.slot as usize)? as usize)
@@ -320,10 +340,10 @@ impl<S: Scalar> World<S> {
                     apart.contains(&[JointHeld::Marble(marble), JointHeld::Body(body)])
                 })
             {
-                return;
+                continue;
             }
             let local = state.solver.pose.inverse_transform_point(ball.center());
-            let reach = ball.radius() + candidates[row].margin + way;
+            let reach = ball.radius() + candidates.list[row].margin + way;
             for (part, shape) in (0..).zip(state.parts.iter()) {
                 if shape.project_point(local).distance > reach {
                     continue;
@@ -338,6 +358,6 @@ impl<S: Scalar> World<S> {
                 let material = ball.material.combined_with(state.body.material).cast();
                 system.contacts.push(ball_contact(key, bodies, ball.radius(), material));
             }
-        });
+        }
     }
 }

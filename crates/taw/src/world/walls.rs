@@ -8,7 +8,7 @@ use crate::broad::CollisionLayers;
 use crate::contact::ClosestPoints;
 use crate::handle::Handles;
 pub use crate::handle::WallId;
-use crate::math::{Point3, Scalar, Vec3, is_finite_point, length};
+use crate::math::{Point3, Scalar, Vec3, is_finite_point};
 use crate::motion::WallMotion;
 use crate::response::{self, Material};
 use crate::shape::{Aabb3, Bvh, Capsule, Plane, PointProjection};
@@ -352,10 +352,7 @@ impl<S: Scalar> Walls<S> {
         rows.filter_map(|row| {
             let motion = self.motion.get(row).filter(|it| !it.angular_velocity.is_zero())?;
             let bounds = self.shapes[row].bounding_box()?;
-            let way = |corner: Point3<S>| (corner - motion.pivot).map(S::abs);
-            let [low, high] = [bounds.min, bounds.max].map(way);
-            let farthest =
-                length(Vec3::new(low.x.max(high.x), low.y.max(high.y), low.z.max(high.z)));
+            let farthest = bounds.farthest_distance(motion.pivot);
             let reach = Vec3::new(farthest, farthest, farthest);
             Some(Aabb3 { min: motion.pivot - reach, max: motion.pivot + reach })
         })

@@ -3,6 +3,7 @@
 mod balls;
 mod flight;
 mod joined;
+mod loads;
 mod piles;
 mod random;
 mod sleep;

@@ -15,6 +15,7 @@ use crate::swarm::surfaces::SurfaceOf;
 use crate::swarm::wall_contact::xyz;
 
 /// Ball that a rigid body may touch.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct BallView<S> {
     pub id: BallId,
     pub slot: u32,
@@ -41,24 +42,27 @@ impl<S: Scalar> BallView<S> {
 }
 
 impl<S: Scalar> Swarm<S> {
-    /// Visits all balls.
-    pub(crate) fn visit_balls(&self, mut visit: impl FnMut(BallView<S>)) {
+    /// All balls.
+    pub(crate) fn ball_views(&self) -> impl Iterator<Item = BallView<S>> + '_ {
+        (0..self.at.len()).filter_map(|row| self.ball_of_row(row))
+    }
+
+    /// Ball in a row.
+    pub(crate) fn ball_of_row(&self, row: usize) -> Option<BallView<S>> {
         let slots = self.ids.slots();
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
-        for (row, (at, velocity)) in self.at.iter().zip(&self.velocity).enumerate() {
-            let Some(id) = self.id(row) else { continue };
-            visit(BallView {
-                id,
-                slot: slots[row],
-                row,
-                at: *at,
-                velocity: xyz(velocity),
-                inverse_mass: velocity[3].abs().as_f64(),
-                is_asleep: velocity[3].is_sign_negative(),
-                material: surfaces.row(row as u32).material,
-                layers: surfaces.filter(row as u32).layers,
-            });
-        }
+        let velocity = self.velocity.get(row)?;
+        Some(BallView {
+            id: self.id(row)?,
+            slot: slots[row],
+            row,
+            at: self.at[row],
+            velocity: xyz(velocity),
+            inverse_mass: velocity[3].abs().as_f64(),
+            is_asleep: velocity[3].is_sign_negative(),
+            material: surfaces.row(row as u32).material,
+            layers: surfaces.filter(row as u32).layers,
+        })
     }
 
     /// Wakes a ball that a body may touch.

@@ -1,0 +1,105 @@
+//! Sleepers on which something comes, goes, or presses otherwise.
+
+use super::*;
+use taw::body::BodyMass;
+use taw::broad::CollisionLayers;
+use taw::swarm::Ball;
+use taw::world::Marble;
+
+/// Plank asleep on a narrow block, with its ends in the air.
+fn plank_on_block() -> (World<f32>, BodyId) {
+    let mut world = world::<f32>(true);
+    let block = Body {
+        mass: BodyMass::Uniform(Mass::Infinite),
+        ..cuboid([0.2, 0.25, 0.2], point(0.0, 0.25, 0.0))
+    };
+    world.bodies.insert(block).unwrap();
+    let plank = world.bodies.insert(cuboid([1.0, 0.02, 0.1], point(0.0, 0.52, 0.0))).unwrap();
+    run(&mut world, 3.0);
+    assert!(world.bodies.is_asleep(plank).unwrap());
+    (world, plank)
+}
+
+/// A weight that is laid on the end of a plank tips it.
+#[test]
+fn a_weight_tips_a_plank_that_sleeps() {
+    for kind in ["marble", "ball", "body"] {
+        let (mut world, plank) = plank_on_block();
+        let at = point(0.9, 0.54 + 0.08, 0.0);
+        match kind {
+            "marble" => drop(world.marbles.insert(Marble::new(at, 0.08)).unwrap()),
+            "ball" => drop(world.swarm.insert(&[Ball::new(at, 0.08)]).unwrap()),
+            _ => drop(world.bodies.insert(cuboid([0.1, 0.08, 0.1], at)).unwrap()),
+        }
+        let mut most = 0.0_f32;
+        for _ in 0..90 {
+            step(&mut world);
+            most = most.max(world.bodies.pose(plank).unwrap().rotation.v.magnitude());
+        }
+        assert!(most > 0.1, "{kind}: {most}");
+    }
+}
+
+/// A box inserted, placed or grown into a sleeper wakes it, and the two part.
+#[test]
+fn a_sleeper_wakes_for_what_is_put_into_it() {
+    type Put = fn(&mut World<f32>, BodyId);
+    let puts: [(&str, Put); 3] = [
+        ("inserted", |world, _| {
+            world.bodies.insert(cuboid([0.1, 0.1, 0.1], point(0.1, 0.1, 0.0))).unwrap();
+        }),
+        ("placed", |world, other| {
+            let pose = world.bodies.pose(other).unwrap();
+            let pose = taw::frame::Pose { translation: vector(0.1, 0.1, 0.0), ..pose };
+            world.bodies.set_pose(other, pose).unwrap();
+        }),
+        ("grown", |world, other| {
+            world.bodies.set(other, cuboid([1.95, 0.1, 0.1], point(2.0, 0.1, 0.0))).unwrap();
+        }),
+    ];
+    for (name, put) in puts {
+        let mut world = world::<f32>(true);
+        let sleeper = world.bodies.insert(cuboid([0.1, 0.1, 0.1], point(0.0, 0.1, 0.0))).unwrap();
+        let other = world.bodies.insert(cuboid([0.1, 0.1, 0.1], point(2.0, 0.1, 0.0))).unwrap();
+        let marble = world.marbles.insert(Marble::new(point(-0.5, 0.1, 0.0), 0.1)).unwrap();
+        run(&mut world, 3.0);
+        assert!(world.bodies.is_asleep(sleeper).unwrap() && world.is_asleep(marble).unwrap());
+        let before = place(&world, sleeper);
+        put(&mut world, other);
+        run(&mut world, 2.0);
+        assert!(before.x - place(&world, sleeper).x > 0.02, "{name}: {:?}", place(&world, sleeper));
+        assert_eq!(world.marbles.get(marble).unwrap().position.x, -0.5, "{name}");
+    }
+}
+
+/// A slab asleep on marbles falls when these pass through it from then on.
+#[test]
+fn a_body_falls_through_balls_that_change_their_layers() {
+    for of_swarm in [false, true] {
+        let mut world = world::<f32>(true);
+        let (mut balls, mut marbles) = (Vec::new(), Vec::new());
+        for (x, z) in [(-0.3, -0.3), (-0.3, 0.3), (0.3, -0.3), (0.3, 0.3)] {
+            let at = point(x, 0.1, z);
+            if of_swarm {
+                balls.extend(world.swarm.insert(&[Ball::new(at, 0.1)]).unwrap());
+            } else {
+                marbles.push(world.marbles.insert(Marble::new(at, 0.1)).unwrap());
+            }
+        }
+        let slab = cuboid([0.5, 0.05, 0.5], point(0.0, 0.25, 0.0));
+        let layers = CollisionLayers { memberships: 1, ..CollisionLayers::ALL };
+        let slab = world.bodies.insert(Body { layers, ..slab }).unwrap();
+        run(&mut world, 5.0);
+        assert!(world.bodies.is_asleep(slab).unwrap());
+        let others = CollisionLayers { memberships: 2, filters: 2 };
+        if of_swarm {
+            world.swarm.set_layers(&balls, others).unwrap();
+        }
+        for marble in &marbles {
+            world.marbles.set_layers(*marble, others).unwrap();
+        }
+        run(&mut world, 2.0);
+        let height = place(&world, slab).y;
+        assert!((height - 0.05).abs() < 2e-3, "of a swarm: {of_swarm}, {height}");
+    }
+}
