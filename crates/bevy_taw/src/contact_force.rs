@@ -8,13 +8,14 @@ use taw::prelude::Zero as _;
 use taw::response::Response;
 
 use crate::SubstepDelta;
+use crate::body_touches::body_touches;
 use crate::components::MarbleState;
 use crate::convert::from_vector;
 use crate::messages::ContactPair;
 use crate::resources::TawWorld;
 use crate::{contact_points, touches};
 
-/// Force that contacts exert on a wall or a marble, in N: add it to those of which you want to know it, a
+/// Force that contacts exert on a wall, a marble or a body, in N: add it to those of which you want to know it, a
 /// button or a scale. Updated after each step; what sleeps keeps its force.
 ///
 /// Known by `SoftStep`, `Impulse` and `Penalty`; zero by `Displacement`, which has no masses. By `EventDriven`, that of
@@ -113,6 +114,11 @@ pub(crate) fn collect(world: Res<TawWorld>, mut impulses: ResMut<PairImpulses>) 
         }
     }
     *impacts = world.impacts().len();
+    now.extend(body_touches(&world).map(|((pair, ..), point)| {
+        let impulse = point.impulse_on(pair.b);
+        let (normal, size) = (Some(point.normal), point.normal_impulse);
+        (pair, PairImpulse { impulse, normal, largest: size, sum: size })
+    }));
 }
 
 /// Returns true if both of a pair sleep, so that their contacts are not listed.

@@ -6,6 +6,7 @@ use taw::contact::{Contact, touch_goes_on};
 use taw::response::Response;
 
 use crate::SubstepDelta;
+use crate::body_touches::body_touches;
 use crate::components::MarbleState;
 use crate::contact_force::sleeps;
 use crate::convert::from_vector;
@@ -14,8 +15,8 @@ use crate::messages::{ContactPair, ContactPoint};
 use crate::resources::TawWorld;
 use crate::touches::{is_read, observers, touch_of, touch_of_impact, trigger_observed};
 
-/// Identity of a contact from step to step: its pair, the sub-shape of the wall, and the features that meet.
-pub(crate) type ContactKey = (ContactPair, u32, u32);
+/// Identity of a contact from step to step: its pair, the parts and the features that meet.
+pub(crate) type ContactKey = (ContactPair, [u32; 2], u32);
 
 /// Contact found in a substep.
 struct Found {
@@ -113,7 +114,7 @@ fn point_of(
     };
     // The feature of the first is in its upper half.
     let feature = if is_swapped { contact.feature.rotate_left(16) } else { contact.feature };
-    Some(((touch.pair, touch.part, feature), point))
+    Some(((touch.pair, [touch.part, 0], feature), point))
 }
 
 /// Notes the impulses of the contacts of this substep, and impacts.
@@ -135,10 +136,16 @@ pub(crate) fn collect_solved(world: Res<TawWorld>, mut points: ResMut<Points>) {
             point.normal_impulse = touch.impulse.dot(touch.normal);
             point.tangent_impulse = touch.impulse.reject_from_normalized(touch.normal);
         }
-        let key = (touch.pair, touch.part, 0); // of balls
+        let key = (touch.pair, [touch.part, 0], 0); // of balls
         now.push(Found { key, point, is_unsolved: true, begins: true });
     }
     *impacts = world.impacts().len();
+    now.extend(body_touches(&world).map(|(key, point)| Found {
+        key,
+        point,
+        is_unsolved: true,
+        begins: true,
+    }));
 }
 
 /// Sums what was found of each contact, and tells it. Contacts of what sleeps are not listed: they stay as they are.

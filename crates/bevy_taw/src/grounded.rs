@@ -3,6 +3,7 @@
 use std::f32::consts::PI;
 
 use bevy::prelude::*;
+use taw::body::ContactPartner;
 use taw::contact::Contact;
 use taw::math::{Point3, Vec3 as TawVec3};
 use taw::world::{ColliderId, QueryTree};
@@ -52,7 +53,7 @@ impl Default for Grounded {
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct Ground {
-    /// The wall or marble.
+    /// The wall, marble or body.
     pub entity: Entity,
     /// Unit normal, toward the marble.
     pub normal: Vec3,
@@ -193,6 +194,22 @@ fn look_below(world: &TawWorld, walls: &Query<&WallState>, seekers: &mut [Seeker
                 let parting = (velocity(marble) - velocity(other)).dot(found.normal);
                 seekers[i].offer(found, is_closed(contact, parting));
             }
+        }
+    }
+    look_at_bodies(world, seekers);
+}
+
+/// Looks for ground among the contacts of bodies.
+fn look_at_bodies(world: &TawWorld, seekers: &mut [Seeker]) {
+    for contact in world.body_contacts().filter(|contact| contact.is_touching) {
+        if let ContactPartner::Marble(marble) = contact.partner
+            && let Ok(row) = world.marbles.row(marble)
+            && let Some(i) = seeker_of(seekers, row as u32)
+            && let Some(entity) = world.body_entities.get(&contact.body)
+            && let Ok(surface) = world.bodies.velocity_at(contact.body, contact.point)
+        {
+            let found = ground(*entity, -contact.normal, contact.point, from_vector(surface));
+            seekers[i].offer(found, true);
         }
     }
 }

@@ -167,6 +167,7 @@
 mod ball;
 mod ball_sensor;
 pub mod body;
+mod body_touches;
 pub mod components;
 pub mod contact_force;
 mod contact_points;

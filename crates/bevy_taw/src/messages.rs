@@ -29,9 +29,9 @@ use bevy::prelude::*;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Reflect)]
 #[reflect(Debug, PartialEq, Hash)]
 pub struct ContactPair {
-    /// A wall, or the marble that compares lower.
+    /// A wall, or the marble or body that compares lower.
     pub a: Entity,
-    /// A marble.
+    /// A marble or a body.
     pub b: Entity,
 }
 
@@ -67,7 +67,8 @@ pub struct ContactStarted {
     pub normal: Vec3,
     /// Contact point, in metres in world space.
     pub point: Vec3,
-    /// Sub-shape of a wall: part of a compound, or triangle of a mesh.
+    /// Part that is met: of a wall's compound or mesh (a triangle), of the body that a marble meets, and of two bodies,
+    /// of that which compares lower.
     pub part: u32,
     /// Approach speed of the two along the normal, in m/s. Negative if they were already parting.
     pub approach_speed: f32,
@@ -84,6 +85,12 @@ impl ContactStarted {
     #[must_use]
     pub fn impulse_on(&self, entity: Entity) -> Vec3 {
         self.pair.on(entity, self.impulse)
+    }
+
+    /// Touch of a contact, whose pair's impulse is not known yet.
+    pub(crate) fn of(contact: &ContactPoint) -> Self {
+        let ContactPoint { pair, normal, point, part, approach_speed, slip_speed, .. } = *contact;
+        Self { pair, normal, point, part, approach_speed, slip_speed, impulse: Vec3::ZERO }
     }
 
     /// Contact that goes on, of which nobody reads more than the pair and the normal.
@@ -150,7 +157,8 @@ pub struct ContactHit {
     pub normal: Vec3,
     /// Contact point, in metres in world space.
     pub point: Vec3,
-    /// Sub-shape of a wall: part of a compound, or triangle of a mesh.
+    /// Part that is met: of a wall's compound or mesh (a triangle), of the body that a marble meets, and of two bodies,
+    /// of that which compares lower.
     pub part: u32,
     /// Approach speed along the normal, in m/s.
     pub approach_speed: f32,
@@ -193,7 +201,7 @@ impl ContactOngoing {
 }
 
 /// One contact of two that touch: a ball in the corner of a mesh has two with it, a capsule that lies on a
-/// floor too. Sent in each step for each contact, also of what sleeps. A contact is known by its pair, the part of
+/// floor too, and a box there four. Sent in each step for each contact, also of what sleeps. A contact is known by its pair, the part of
 /// the wall and the features of capsules that meet, so that what rolls from triangle to triangle of a mesh begins one after
 /// the other.
 ///
@@ -218,7 +226,8 @@ pub struct ContactPoint {
     pub normal: Vec3,
     /// Contact point, in metres in world space.
     pub point: Vec3,
-    /// Sub-shape of a wall: part of a compound, or triangle of a mesh.
+    /// Part that is met: of a wall's compound or mesh (a triangle), of the body that a marble meets, and of two bodies,
+    /// of that which compares lower.
     pub part: u32,
     /// True in the first step of the contact.
     pub is_new: bool,
@@ -264,7 +273,8 @@ impl ContactPoint {
 ///
 /// A resting marble touches in one step and hovers in the next, so a contact ends only
 /// when the gap is wider than a fiftieth of the smaller radius and than gravity
-/// closes in a substep (`g dt²`).
+/// closes in a substep (`g dt²`). Of a body, the distance of its farthest point from its center of mass counts as the
+/// radius.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct ContactEnded {

@@ -8,6 +8,7 @@ use taw::math::{Vec3 as TawVec3, length};
 use taw::response::{Impact, Response};
 
 use crate::SubstepDelta;
+use crate::body_touches::body_touches;
 use crate::components::{MarbleState, WallState};
 use crate::contact_force::{impulse_of, step_of};
 use crate::convert::{from_point, from_vector};
@@ -206,7 +207,7 @@ pub(crate) fn collect(
     }
 }
 
-/// Notes the collisions that the response went through by itself.
+/// Notes the collisions that the response went through by itself, and the contacts of bodies.
 pub(crate) fn collect_impacts(
     world: Res<TawWorld>,
     delta: Res<SubstepDelta>,
@@ -224,6 +225,11 @@ pub(crate) fn collect_impacts(
         }
     }
     touches.impacts = world.impacts().len();
+    for (_, point) in body_touches(&world) {
+        let bears = point.normal_impulse > 0.0;
+        let slowest = if bears { fastest_rest(&world, delta.0) } else { f32::INFINITY };
+        touches.add(ContactStarted::of(&point), slowest);
+    }
 }
 
 /// Compares this step's contacts with the last one's.

@@ -35,8 +35,6 @@ pub(crate) struct BodyState<S> {
     pub asleep: bool,
     /// Box about it while it sleeps.
     asleep_in: Option<Aabb3<f64>>,
-    /// Force in N and torque in N m by balls and bodies with which it sleeps.
-    load: Option<[Vec3<f64>; 2]>,
 }
 
 impl<S: Scalar> BodyState<S> {
@@ -65,7 +63,6 @@ impl<S: Scalar> BodyState<S> {
             rest_speed: 0.0,
             asleep: false,
             asleep_in: None,
-            load: None,
             body,
         };
         state.set_pose(Pose {
@@ -120,8 +117,7 @@ impl<S: Scalar> BodyState<S> {
 
     /// Wakes it.
     pub fn wake(&mut self) {
-        (self.rest, self.asleep) = (rest::MOVES, false);
-        (self.asleep_in, self.load) = (None, None);
+        (self.rest, self.asleep, self.asleep_in) = (rest::MOVES, false, None);
     }
 
     /// Speed of its surface, at most, in m/s.
@@ -149,14 +145,6 @@ impl<S: Scalar> BodyState<S> {
     /// Returns true if it has rested for long enough to sleep under this gravity, in m/s².
     pub fn may_sleep(&self, gravity: f64) -> bool {
         rest::lasts(self.rest, self.reach, gravity * self.body.gravity_scale.as_f64().abs())
-    }
-
-    /// Notes the force in N and the torque in N m on it while it sleeps. Returns the acceleration of its surface, at
-    /// most, by what changed of them since it fell asleep, in m/s².
-    pub fn note_load(&mut self, load: [Vec3<f64>; 2]) -> f64 {
-        let [force, torque] = *self.load.get_or_insert(load);
-        let turn = self.solver.inverse_inertia * (load[1] - torque);
-        (load[0] - force).magnitude() * self.solver.inverse_mass + turn.magnitude() * self.reach
     }
 
     /// Falls asleep.

@@ -3,12 +3,12 @@
 use cgmath::{EuclideanSpace, Zero};
 
 use super::body_state::{BodyState, cast_rotation};
-use super::contact::BodyContact;
+use super::contact::{BodyContact, BodyPartner};
 use super::{Body, BodyId};
 use crate::Error;
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Pose;
-use crate::handle::Handles;
+use crate::handle::{BallId, Handles};
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector};
 use crate::shape::{Aabb3, MassProperties};
 
@@ -271,6 +271,16 @@ impl<S: Scalar> Bodies<S> {
         })
     }
 
+    /// Velocity of its material at a point of the world, in m/s.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`], [`Error::NotFinite`].
+    pub fn velocity_at(&self, id: BodyId, point: Point3<S>) -> Result<Vec3<S>, Error> {
+        let row = self.row(id)?;
+        let arm = self.arm(row, point)?;
+        Ok(cast_vector(self.states[row].solver.velocity_at(arm)))
+    }
+
     /// Distance of its surface from its center of mass, at most, in metres.
     ///
     /// # Errors
@@ -354,6 +364,14 @@ impl<S: Scalar> Bodies<S> {
     fn arm(&self, row: usize, point: Point3<S>) -> Result<Vec3<f64>, Error> {
         let point = finite_point(["point.x", "point.y", "point.z"], point)?;
         Ok(cast_point::<S, f64>(point).to_vec() - self.states[row].solver.pose.translation)
+    }
+
+    /// Balls that touched a body in the last step, and the body's row.
+    pub(crate) fn touching_balls(&self) -> impl Iterator<Item = (BallId, usize)> + '_ {
+        self.contacts.iter().filter(|contact| contact.touches).filter_map(|contact| {
+            let BodyPartner::Ball(ball) = contact.key.partner else { return None };
+            Some((ball, self.row(contact.key.body).ok()?))
+        })
     }
 
     /// Wakes a sleeper, and all that sleep with it.

@@ -9,17 +9,20 @@
 mod body_state;
 mod bounce;
 mod contact;
+mod contact_info;
 mod list;
 mod solve;
 mod state;
 mod system;
 
 pub use crate::handle::BodyId;
+pub use contact_info::{BodyContactInfo, ContactPartner};
 pub use list::{Bodies, BodyPlace};
 
 pub(crate) use body_state::BodyState;
 pub(crate) use contact::{
-    BodyContact, BodyContactKey, BodyPartner, SweptManifold, ball_contact, manifold_contact,
+    BodyContact, BodyContactKey, BodyContactPoint, BodyPartner, SweptManifold, ball_contact,
+    manifold_contact,
 };
 pub(crate) use state::{SolverBody, turned_freely};
 pub(crate) use system::BodySystem;

@@ -12,6 +12,8 @@ pub(super) struct SleepState<S> {
     pub groups: SleepGroups,
     /// Slots of balls that never sleep, nor do their islands.
     pub sleepless: BitSet,
+    /// Slots of balls that touch a rigid body which is awake, nor do they or their islands fall asleep.
+    pub held: BitSet,
     /// Slots of balls that were changed from outside since the last step.
     pub stirred: BitSet,
     /// Number of balls that sleep.
@@ -22,8 +24,14 @@ pub(super) struct SleepState<S> {
 
 impl<S: Scalar> SleepState<S> {
     pub fn bytes(&self) -> usize {
-        let Self { rest, groups, sleepless, stirred, sleepers: _, clock: _ } = self;
-        rest.bytes() + groups.bytes() + sleepless.bytes() + stirred.bytes()
+        let Self { rest, groups, sleepless, held, stirred, sleepers: _, clock: _ } = self;
+        let sets = sleepless.bytes() + held.bytes() + stirred.bytes();
+        rest.bytes() + groups.bytes() + sets
+    }
+
+    /// Returns true for a slot whose ball may not fall asleep.
+    pub fn is_sleepless(&self, slot: u32) -> bool {
+        self.sleepless.contains(slot) || self.held.contains(slot)
     }
 }
 

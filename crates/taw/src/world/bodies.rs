@@ -12,9 +12,6 @@ use crate::math::{Scalar, UnionFind, Vec3, cast_point, cast_vector};
 use crate::motion::rest;
 use crate::shape::{Aabb, Aabb3, Bvh};
 
-/// Acceleration of the surface of a sleeper by a change of its load, over gravity, from which on it wakes.
-const LOAD: f64 = 0.05;
-
 /// Gravity and identity of the walls by which bodies fell asleep, and scratch memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BodyScratch<S> {
@@ -39,6 +36,7 @@ impl<S: Scalar> World<S> {
     pub(super) fn give_bodies(&mut self, dt: S) {
         self.bodies.stopped.clear();
         self.wake_at_changed_bodies();
+        self.wake_touching();
         if self.bodies.is_empty() {
             return;
         }
@@ -89,15 +87,37 @@ impl<S: Scalar> World<S> {
         contacts.retain(|contact| !stopped.iter().any(|id| contact.is_of(*id)));
         self.note_touches(&mut contacts, dt.as_f64());
         self.keep_contacts(contacts);
-        self.wake_loaded_bodies(dt.as_f64());
         self.update_body_sleep(&lies, dt);
+    }
+
+    /// Wakes bodies that touch a ball or a body which does not rest, or touched a ball that is gone, and keeps balls
+    /// awake that touch a body which is: the two fall asleep together.
+    fn wake_touching(&mut self) {
+        let awake_balls = self.bodies.touching_balls().filter(|it| !self.swarm.rests(it.0));
+        let mut touched: Vec<_> = awake_balls.map(|(_, row)| row).collect();
+        let states = &self.bodies.states;
+        for contact in self.bodies.contacts.iter().filter(|contact| contact.touches) {
+            if let BodyPartner::Body(other) = contact.key.partner
+                && let (Ok(a), Ok(b)) = (self.bodies.row(other), self.bodies.row(contact.key.body))
+                && states[a].asleep != states[b].asleep
+                && states[a].is_dynamic()
+                && states[b].is_dynamic()
+            {
+                touched.extend([a, b]);
+            }
+        }
+        for row in touched {
+            self.bodies.wake_island(row); // no other but sleepers
+        }
+        let (bodies, swarm) = (&self.bodies, &mut self.swarm);
+        let held = bodies.touching_balls().filter(|(_, row)| !bodies.states[*row].is_still());
+        swarm.hold_awake(held.map(|(ball, _)| ball));
     }
 
     /// Remembers contacts, those of sleepers too, which were not looked for.
     fn keep_contacts(&mut self, contacts: Vec<BodyContact>) {
         let before = std::mem::replace(&mut self.bodies.contacts, contacts);
-        let is_still =
-            |id| self.bodies.row(id).is_ok_and(|row| self.bodies.states[row].is_still());
+        let is_still = |id| self.bodies.row(id).is_ok_and(|row| self.bodies.states[row].is_still());
         let slept = |contact: &BodyContact| {
             is_still(contact.key.body)
                 && match contact.key.partner {
@@ -106,8 +126,11 @@ impl<S: Scalar> World<S> {
                     BodyPartner::Wall(wall) => self.walls.row(wall).is_ok(),
                 }
         };
-        let kept: Vec<_> = before.into_iter().filter(slept).collect();
+        let mut kept: Vec<_> = before.into_iter().filter(slept).collect();
         if !kept.is_empty() {
+            for point in kept.iter_mut().flat_map(|contact| &mut contact.points) {
+                point.fastest = [0.0; 2]; // nothing moves
+            }
             self.bodies.contacts.extend(kept);
             self.bodies.contacts.sort_by_key(|contact| contact.key);
             self.bodies.contacts.dedup_by_key(|contact| contact.key);
@@ -241,39 +264,6 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Wakes sleepers on which balls and bodies press otherwise than when they fell asleep.
-    fn wake_loaded_bodies(&mut self, dt: f64) {
-        if !self.bodies.states.iter().any(|state| state.asleep) {
-            return;
-        }
-        let mut loads = vec![[Vec3::zero(); 2]; self.bodies.len()];
-        for contact in &self.bodies.contacts {
-            let partner = match contact.key.partner {
-                BodyPartner::Wall(_) => continue, // its force is the sum of all others
-                BodyPartner::Ball(_) => None,
-                BodyPartner::Body(id) => self.bodies.row(id).ok(),
-            };
-            let body = self.bodies.row(contact.key.body).ok();
-            for point in &contact.points {
-                let force = point.total.along(contact.normal) / dt;
-                for (row, arm, force) in [(partner, 0, -force), (body, 1, force)] {
-                    if let Some([sum, torque]) = row.and_then(|row| loads.get_mut(row)) {
-                        *sum += force;
-                        *torque += point.arms[arm].cross(force);
-                    }
-                }
-            }
-        }
-        let gravity = cast_vector::<S, f64>(self.settings.gravity).magnitude();
-        for (row, load) in loads.into_iter().enumerate() {
-            let state = &mut self.bodies.states[row];
-            let pull = gravity * state.body.gravity_scale.as_f64().abs();
-            if state.asleep && state.note_load(load) > LOAD * pull {
-                self.bodies.wake_island(row);
-            }
-        }
-    }
-
     /// True for each body that lies on something, and on nothing that drives it: a wall or a kinematic body that
     /// moves, or a surface that does.
     fn bodies_that_lie(&self, solver: &[SolverBody], contacts: &[BodyContact]) -> Vec<bool> {
@@ -318,6 +308,9 @@ impl<S: Scalar> World<S> {
         let of_row: Vec<_> = (0..states.len()).map(|row| islands.set_of(row) as usize).collect();
         for (state, island) in states.iter().zip(&of_row) {
             restless[*island] |= !state.asleep && !state.may_sleep(gravity);
+        }
+        for (ball, row) in self.bodies.touching_balls() {
+            restless[of_row[row]] |= !self.swarm.rests(ball);
         }
         for (state, island) in self.bodies.states.iter_mut().zip(&of_row) {
             if state.is_dynamic() && !restless[*island] && !state.asleep {

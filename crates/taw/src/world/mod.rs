@@ -1,6 +1,7 @@
 //! World: its state as columns, its step, queries, and the energy audit.
 
 mod bodies;
+mod body_contact_info;
 mod body_contacts;
 mod body_seams;
 mod changed_rows;

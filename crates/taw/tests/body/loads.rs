@@ -1,7 +1,7 @@
 //! Sleepers on which something comes, goes, or presses otherwise.
 
 use super::*;
-use taw::body::BodyMass;
+use taw::body::{BodyContactInfo, BodyMass, ContactPartner};
 use taw::broad::CollisionLayers;
 use taw::swarm::Ball;
 use taw::world::Marble;
@@ -102,4 +102,83 @@ fn a_body_falls_through_balls_that_change_their_layers() {
         let height = place(&world, slab).y;
         assert!((height - 0.05).abs() < 2e-3, "of a swarm: {of_swarm}, {height}");
     }
+}
+
+/// Contacts tell who touches whom, where, and with which forces; those of what sleeps, too.
+#[test]
+fn contacts_tell_forces_and_partners() {
+    let mut world = world::<f64>(true);
+    let floor = world.walls.id(0).unwrap();
+    let lower = world.bodies.insert(cuboid([0.2, 0.1, 0.2], point(0.0, 0.1, 0.0))).unwrap();
+    let upper = world.bodies.insert(cuboid([0.1, 0.1, 0.1], point(0.0, 0.3, 0.0))).unwrap();
+    let marble = Marble { mass: Mass::Kilograms(1.0), ..Marble::new(point(0.0, 0.45, 0.0), 0.05) };
+    let marble = world.marbles.insert(marble).unwrap();
+    // Its handle may differ in row and generation from that of its ball.
+    for _ in 0..2 {
+        let gone = world.marbles.insert(Marble::new(point(3.0, 0.45, 0.0), 0.05)).unwrap();
+        world.marbles.remove(gone).unwrap();
+    }
+    run(&mut world, 0.4);
+    let weights = [
+        (upper, ContactPartner::Marble(marble), -1.0, 0.4, 1),
+        (upper, ContactPartner::Body(lower), 9.0, 0.2, 4),
+        (lower, ContactPartner::Wall(floor), 41.0, 0.0, 4),
+    ];
+    for asleep in [false, true] {
+        for (body, partner, mass, height, points) in weights {
+            let of_pair = |it: &BodyContactInfo<f64>| (it.body, it.partner) == (body, partner);
+            let found: Vec<_> = world.body_contacts().filter(of_pair).collect();
+            assert_eq!(found.len(), points, "{partner:?}");
+            assert!(found.iter().all(|it| it.is_touching && (it.point.y - height).abs() < 1e-3));
+            let force: f64 = found.iter().map(|it| it.normal.y * it.normal_impulse * 60.0).sum();
+            assert!((force / (mass * 9.81) - 1.0).abs() < 0.01, "{partner:?}: {force} N");
+        }
+        assert_eq!(world.bodies.is_asleep(upper).unwrap(), asleep);
+        run(&mut world, 4.0);
+    }
+}
+
+/// Approach speed and impulse of a ball that hits a body, and the touch that ends when it leaves.
+#[test]
+fn a_hit_is_told_with_its_speed_and_impulse() {
+    let mut world = world::<f64>(false);
+    world.set_gravity(vector(0.0, 0.0, 0.0)).unwrap();
+    let elastic = material(0.0, 1.0);
+    let wall = Body {
+        mass: BodyMass::Uniform(Mass::Infinite),
+        material: elastic,
+        ..cuboid([0.1, 1.0, 1.0], point(0.0, 0.0, 0.0))
+    };
+    world.bodies.insert(wall).unwrap();
+    let ball = Marble {
+        mass: Mass::Kilograms(2.0),
+        velocity: vector(-7.0, 1.0, 0.0),
+        material: Some(elastic),
+        ..Marble::new(point(1.0, 0.0, 0.0), 0.1)
+    };
+    let ball = world.marbles.insert(ball).unwrap();
+    let mut touches = Vec::new();
+    for _ in 0..30 {
+        step(&mut world);
+        touches.extend(world.body_contacts().filter(|contact| contact.is_touching));
+    }
+    assert!(!touches.is_empty() && touches.len() <= 2, "{touches:?}");
+    let BodyContactInfo { partner, normal, approach_speed, slip_speed, normal_impulse, .. } =
+        touches[0];
+    assert_eq!((partner, normal.x.round()), (ContactPartner::Marble(ball), -1.0));
+    assert!((approach_speed - 7.0).abs() < 1e-9 && (slip_speed - 1.0).abs() < 1e-9);
+    assert!((normal_impulse - 28.0).abs() < 1e-9, "{normal_impulse} N s");
+}
+
+/// A slab that fell asleep on balls weighs what it did, by its contacts, which were solved for some steps as those of an
+/// obstacle: balls fall asleep up to eight steps later.
+#[test]
+fn what_sleeps_on_balls_keeps_its_forces() {
+    let (world, slab, _) = super::sleep::slab_on_balls(false);
+    let force: f32 = world
+        .body_contacts()
+        .filter(|it| it.body == slab && it.is_touching)
+        .map(|it| it.normal.y * it.normal_impulse * 60.0)
+        .sum();
+    assert!((force / (100.0 * 9.81) - 1.0).abs() < 0.05, "{force} N");
 }

@@ -6,7 +6,7 @@ use taw::swarm::Ball;
 use taw::world::Marble;
 
 /// Slab asleep on four balls of a swarm or marbles, and these.
-fn slab_on_balls(of_swarm: bool) -> (World<f32>, BodyId, impl Fn(&mut World<f32>)) {
+pub fn slab_on_balls(of_swarm: bool) -> (World<f32>, BodyId, impl Fn(&mut World<f32>)) {
     let mut world = world::<f32>(true);
     let (mut balls, mut marbles) = (Vec::new(), Vec::new());
     for (x, z) in [(-0.3, -0.3), (-0.3, 0.3), (0.3, -0.3), (0.3, 0.3)] {

@@ -6,7 +6,7 @@ use crate::body::BodySystem;
 use crate::broad::CollisionLayers;
 use crate::constraint::ContactSoftness;
 use crate::handle::{BallId, NO_ROW};
-use crate::math::{Mat3, Point3, Row, Scalar, Vec3, cast_vector};
+use crate::math::{Mat3, Point3, Row, Scalar, Vec3, cast_vector, length};
 use crate::motion::BALL_INVERSE_INERTIA;
 use crate::response::Material;
 use crate::swarm::Swarm;
@@ -68,6 +68,27 @@ impl<S: Scalar> Swarm<S> {
     /// Wakes a ball that a body may touch.
     pub(crate) fn wake_row(&mut self, row: usize) {
         self.wake(row);
+    }
+
+    /// Keeps these balls awake in the next step, and no others.
+    pub(crate) fn hold_awake(&mut self, balls: impl Iterator<Item = BallId>) {
+        self.sleep.held.clear();
+        for ball in balls {
+            let Ok(row) = self.row(ball) else { continue };
+            self.sleep.held.insert(self.ids.slots()[row]);
+            if self.velocity[row][3].is_sign_negative() {
+                self.wake(row);
+            }
+        }
+    }
+
+    /// Returns true if a ball sleeps, or rests and would.
+    pub(crate) fn rests(&self, ball: BallId) -> bool {
+        let Ok(row) = self.row(ball) else { return false };
+        let gravity = length(self.gravity.unwrap_or_else(Vec3::zero));
+        let rest = &self.sleep.rest;
+        self.velocity[row][3].is_sign_negative()
+            || rest.is_at_rest(row) && rest.lasts(row, self.at[row][3], gravity)
     }
 
     /// Sets the rigid bodies of the next step.

@@ -33,7 +33,7 @@ impl<S: Scalar> Swarm<S> {
                     let (slot, sleep) = (swarm.ids.slots()[row as usize], &swarm.sleep);
                     let radius = swarm.at[row as usize][3];
                     !sleep.rest.lasts(row as usize, radius, gravity)
-                        || sleep.sleepless.contains(slot)
+                        || sleep.is_sleepless(slot)
                         || has_proxies && swarm.body_slots.contains(slot)
                 };
                 let rows = 0..self.at.len() as u32;

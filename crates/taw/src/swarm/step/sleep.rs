@@ -29,11 +29,12 @@ impl<S: Scalar> Swarm<S> {
         let (velocity, spin) = (&self.velocity[..], &self.spin[..]);
         let (slots, bodies) = (self.ids.slots(), &self.body_slots);
         let (has_proxies, reach) = (!self.proxies.is_empty(), self.reach_of_skins());
-        let (sleepless, weight) = (&self.sleep.sleepless, length(gravity));
+        let weight = length(gravity);
         let looks = self.model.sleeps && weight > S::zero() && is_first;
         // More than this are too many.
         let most = self.fast_movers.remaining(self.at.len()) + 1;
-        let rest = self.sleep.rest.shared();
+        let SleepState { rest, sleepless, held, .. } = &mut self.sleep;
+        let rest = rest.shared();
         let chunks = DisjointSlice::new(&mut self.chunks);
         parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             // SAFETY: each thread has its own chunks.
@@ -71,7 +72,7 @@ impl<S: Scalar> Swarm<S> {
             let is_proxy = |row: usize| has_proxies && bodies.contains(slot(row));
             rest.update([at, velocity, spin], is_proxy, weight, dt);
             chunk.end_rest_of_carried(&mut rest);
-            let is_sleepless = |row: usize| sleepless.contains(slot(row));
+            let is_sleepless = |row| sleepless.contains(slot(row)) || held.contains(slot(row));
             chunk.find_rest([at, velocity], is_sleepless, is_proxy, &mut rest, weight);
         });
         if is_first {

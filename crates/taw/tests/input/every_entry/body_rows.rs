@@ -31,7 +31,7 @@ pub fn bodies<S: Scalar>() -> Vec<Row<S>> {
             let mass = mass.validated()?;
             with_body(p, Body { mass: BodyMass::Given(mass), ..body() })
         };
-        World 5 "Bodies::apply_force Bodies::apply_impulse Bodies::apply_central_force Bodies::apply_central_impulse Bodies::set_velocity Bodies::set_pose Bodies::kinetic_energy Bodies::is_asleep Bodies::wake Bodies::reach": |p, x| {
+        World 5 "Bodies::apply_force Bodies::apply_impulse Bodies::apply_central_force Bodies::apply_central_impulse Bodies::set_velocity Bodies::set_pose Bodies::kinetic_energy Bodies::is_asleep Bodies::wake Bodies::reach Bodies::velocity_at": |p, x| {
             // On a copy, so that a refusal after the insertion leaves the world as it was.
             let mut bodies = p.world.bodies.clone();
             let id = bodies.insert(body())?;
@@ -47,6 +47,7 @@ pub fn bodies<S: Scalar>() -> Vec<Row<S>> {
             bodies.kinetic_energy(id)?;
             bodies.is_asleep(id)?;
             bodies.reach(id)?;
+            bodies.velocity_at(id, at)?;
             bodies.wake(id)?;
             if p.world.model().response == Response::SoftStep {
                 p.world.bodies = bodies;
