@@ -8,7 +8,7 @@ use bevy_taw::snapshot::RowRemoved;
 
 use crate::scene;
 
-fn app() -> App {
+pub fn app() -> App {
     let mut app = scene::app();
     app.insert_resource(TawModel(Model::GAME));
     app.world_mut().spawn(Wall::HalfSpace(Dir3::Y));
@@ -272,4 +272,66 @@ fn a_hinge_driven_to_an_angle_tells_it() {
     assert!((angle - 0.7).abs() < 1e-3, "{angle}");
     let drawn = transform(&app, arm).rotation.angle_between(Quat::from_rotation_z(0.7));
     assert!(drawn < 1e-3, "{drawn}");
+}
+
+/// Place of a marble or body in the physics.
+pub fn truth(app: &App, entity: Entity) -> Vec3 {
+    place_in(app.world().resource(), entity)
+}
+
+fn place_in(world: &TawWorld, entity: Entity) -> Vec3 {
+    let marble = (0..world.marbles.len())
+        .find(|row| world.marble_entity(*row as u32) == Some(entity))
+        .map(|row| world.marbles.position()[row]);
+    let body = world.body_id(entity).map(|id| world.bodies.motion(id).unwrap().position);
+    let place = marble.or(body).expect("it is in the world");
+    Vec3::new(place.x, place.y, place.z)
+}
+
+/// Marbles and bodies, each carried by the one before.
+#[derive(Resource)]
+pub struct Chain(Vec<Entity>);
+
+/// Adds three marbles or bodies above an entity, each carried by the one before. They move on by 0.1, 0.2 and 0.3 m a
+/// step and turn. The bits of `kinds` say which are bodies.
+pub fn carry(app: &mut App, root: Entity, kinds: u8) -> Vec<Entity> {
+    let mut chain = vec![root];
+    for i in 0..3_u8 {
+        let velocity = Vec3::X * 0.1 * f32::from(i + 1) / scene::STEP;
+        let motion = (Velocity(velocity), AngularVelocity(Vec3::ONE * 3.0));
+        let at = Transform::from_xyz(0.0, 3.0, 0.0);
+        let it = (motion, at, ChildOf(chain[usize::from(i)]));
+        let it = if kinds & (1 << i) == 0 {
+            app.world_mut().spawn((Marble::new(0.1), it)).id()
+        } else {
+            app.world_mut().spawn((Body::from(Cuboid::new(0.2, 0.2, 0.2)), it)).id()
+        };
+        chain.push(it);
+    }
+    chain.remove(0);
+    app.insert_resource(Chain(chain.clone()));
+    chain
+}
+
+/// Asserts that the `Transform`s of a chain are where the physics has it.
+pub fn are_true(world: Res<TawWorld>, chain: Res<Chain>, places: TransformHelper) {
+    for it in &chain.0 {
+        let place = places.compute_global_transform(*it).unwrap().translation();
+        let far = place.distance(place_in(&world, *it));
+        assert!(far < 1e-3, "{far} m");
+    }
+}
+
+#[test]
+fn what_marbles_and_bodies_carry_is_written_in_the_same_step() {
+    for kinds in 0..8 {
+        let mut app = app();
+        app.insert_resource(Gravity(Vec3::ZERO));
+        let root = app.world_mut().spawn(Transform::default()).id();
+        let chain = carry(&mut app, root, kinds);
+        app.add_systems(FixedUpdate, are_true.after(TawSystems::Scatter));
+        scene::frames(&mut app, 65);
+        let way = truth(&app, chain[2]).x - 0.3;
+        assert!((way - 0.3 * 64.0).abs() < 1e-2, "{kinds}: {way} m");
+    }
 }
