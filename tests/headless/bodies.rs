@@ -274,6 +274,28 @@ fn a_hinge_driven_to_an_angle_tells_it() {
     assert!(drawn < 1e-3, "{drawn}");
 }
 
+/// What is written to a child while an ancestor has no `Transform` counts once it has one.
+#[test]
+fn a_child_body_goes_where_it_was_written_once_it_has_a_place() {
+    let mut app = app();
+    app.insert_resource(Gravity(Vec3::ZERO));
+    let at = Transform::from_xyz(1.0, 0.0, 0.0);
+    let parent = app.world_mut().spawn(at).id();
+    let child = (Body::from(Sphere::new(0.1)), Velocity::default(), ChildOf(parent));
+    let child = app.world_mut().spawn((child, Transform::from_xyz(0.0, 5.0, 0.0))).id();
+    scene::frames(&mut app, 2);
+    app.world_mut().entity_mut(parent).remove::<Transform>();
+    scene::frames(&mut app, 2);
+    app.world_mut().get_mut::<Transform>(child).unwrap().translation.y = 7.0;
+    **app.world_mut().get_mut::<Velocity>(child).unwrap() = Vec3::Z;
+    scene::frames(&mut app, 2);
+    assert_eq!(truth(&app, child), Vec3::new(1.0, 5.0, 0.0), "nobody can say where it is");
+    app.world_mut().entity_mut(parent).insert(at);
+    scene::frames(&mut app, 1);
+    assert_eq!(truth(&app, child), Vec3::new(1.0, 7.0, scene::STEP));
+    assert_eq!(transform(&app, child).translation, Vec3::new(0.0, 7.0, scene::STEP));
+}
+
 /// Place of a marble or body in the physics.
 pub fn truth(app: &App, entity: Entity) -> Vec3 {
     place_in(app.world().resource(), entity)

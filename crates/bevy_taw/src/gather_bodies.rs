@@ -167,7 +167,7 @@ pub(crate) fn gather(
         let seen = it.seen();
         it.state.refused &= !again;
         it.state.id = it.state.id.filter(|id| world.bodies.motion(*id).is_ok());
-        let last = std::mem::replace(&mut it.state.seen, seen);
+        let last = it.state.seen;
         let is_settled = it.state.id.is_some() || it.state.refused && !it.is_child;
         if is_settled && last == seen && !it.body.is_changed() && !restored {
             continue;
@@ -182,6 +182,7 @@ pub(crate) fn gather(
         } else {
             (it.transform.translation, it.transform.rotation)
         };
+        it.state.seen = seen; // only now: what is written to a child without a place counts later
         match it.take_over(&mut world, place, (&last, &seen), restored) {
             Ok(id) => {
                 (it.state.id, it.state.refused, it.state.away) = (Some(id), false, None);
