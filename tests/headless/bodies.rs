@@ -357,3 +357,33 @@ fn what_marbles_and_bodies_carry_is_written_in_the_same_step() {
         assert!((way - 0.3 * 64.0).abs() < 1e-2, "{kinds}: {way} m");
     }
 }
+
+#[test]
+fn a_body_that_the_game_takes_out_comes_again_and_is_no_ghost() {
+    let mut app = app();
+    app.insert_resource(Gravity(Vec3::ZERO));
+    let at = Transform::from_xyz(0.0, 5.0, 0.0);
+    let body = app.world_mut().spawn((Body::default(), at)).id();
+    for _ in 0..8 {
+        scene::frames(&mut app, 2);
+        let mut world = app.world_mut().resource_mut::<TawWorld>();
+        let id = world.body_id(body).unwrap();
+        assert!(world.bodies.remove(id).is_ok(), "it is named by the row that it has");
+    }
+}
+
+#[test]
+fn a_body_that_no_entity_stands_behind_is_taken_out_and_told() {
+    let mut app = app();
+    let body = app.world_mut().spawn(Body::default()).id();
+    scene::frames(&mut app, 2);
+    let clone = (**app.world().resource::<TawWorld>()).clone();
+    app.world_mut().despawn(body);
+    scene::frames(&mut app, 2);
+    **app.world_mut().resource_mut::<TawWorld>() = clone;
+    app.update();
+    let told = app.world().resource::<Messages<RowRemoved>>();
+    let told: Vec<_> = told.iter_current_update_messages().collect();
+    assert!(matches!(told[..], [RowRemoved::Body(_)]), "{told:?}");
+    assert!(app.world().resource::<TawWorld>().bodies.is_empty());
+}

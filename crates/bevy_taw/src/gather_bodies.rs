@@ -133,9 +133,9 @@ impl BodyComponentsItem<'_, '_> {
     }
 }
 
-/// Run condition: there are bodies, also disabled ones.
-pub(crate) fn any(bodies: Query<(), (With<Body>, Allow<Disabled>)>) -> bool {
-    !bodies.is_empty()
+/// Run condition: there are bodies, also disabled ones, or rows that the game put in by itself.
+pub(crate) fn any(world: Res<TawWorld>, bodies: Query<(), (With<Body>, Allow<Disabled>)>) -> bool {
+    !(world.bodies.is_empty() && bodies.is_empty())
 }
 
 /// Puts new bodies in, and takes over what somebody else wrote since the last scatter.
@@ -143,7 +143,7 @@ pub(crate) fn gather(
     mut world: ResMut<TawWorld>,
     mut bodies: Query<BodyComponents, Allow<Disabled>>,
     transforms: TransformHelper,
-    (mut refusals, mut commands): (Refusals, Commands),
+    (mut refusals, mut removed, mut commands): (Refusals, MessageWriter<RowRemoved>, Commands),
     mut was_known: Local<bool>,
 ) {
     let is_known = world.model().response.knows_bodies();
@@ -194,27 +194,37 @@ pub(crate) fn gather(
             }
         }
     }
+    // Somebody else changed bodies, or the world is another one.
+    let rows = bodies.iter().filter(|it| it.state.id.is_some()).count();
+    if [world.bodies.len(), world.body_entities.len()] != [rows; 2] {
+        take_out(&mut world, &bodies, &mut removed);
+    }
 }
 
-/// Gives body entities the rows that they have in a restored world, and takes out those that no entity stands behind.
-pub(crate) fn name(
-    mut world: ResMut<TawWorld>,
-    mut bodies: Query<&mut BodyState, Allow<Disabled>>,
-    mut removed: MessageWriter<RowRemoved>,
+/// Takes out the rows that no entity stands behind, and forgets the names of those that are gone.
+fn take_out(
+    world: &mut TawWorld,
+    bodies: &Query<BodyComponents, Allow<Disabled>>,
+    removed: &mut MessageWriter<RowRemoved>,
 ) {
+    let has_row = |id| bodies.get(*world.body_entities.get(&id)?).ok()?.state.id;
+    let gone: Vec<_> = world.bodies.ids().filter(|id| has_row(*id) != Some(*id)).collect();
+    for id in gone {
+        let _ = world.bodies.remove(id); // it is there: its row named it
+        log::warn!("taw took out {id:?}: no entity stands behind it");
+        removed.write(RowRemoved::Body(id));
+    }
+    world.body_entities.retain(|id, _| world.world.bodies.motion(*id).is_ok());
+}
+
+/// Gives body entities the rows that they have in a restored world.
+pub(crate) fn name(world: Res<TawWorld>, mut bodies: Query<&mut BodyState, Allow<Disabled>>) {
     for mut state in &mut bodies {
         (state.id, state.refused) = (None, false);
     }
-    let known: Vec<_> = world.body_entities.iter().map(|(id, entity)| (*id, *entity)).collect();
-    for (id, entity) in known {
-        if let Ok(mut state) = bodies.get_mut(entity) {
-            (state.id, state.away) = (Some(id), None);
-            continue;
-        }
-        world.body_entities.remove(&id);
-        if world.bodies.remove(id).is_ok() {
-            log::warn!("taw took out {id:?}: no entity stands behind it");
-            removed.write(RowRemoved::Body(id));
+    for (id, entity) in &world.body_entities {
+        if let Ok(mut state) = bodies.get_mut(*entity) {
+            (state.id, state.away) = (Some(*id), None);
         }
     }
 }

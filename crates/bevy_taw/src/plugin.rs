@@ -265,8 +265,9 @@ fn add_gather(app: &mut App) {
                 .chain()
                 .run_if(pair_filter::any),
             ignore::gather.run_if(ignore::any),
-            (gather_bodies::name, joint::name).chain().run_if(snapshot::was_restored),
+            gather_bodies::name.run_if(snapshot::was_restored),
             (gather_bodies::gather, gather_bodies::forces).chain().run_if(gather_bodies::any),
+            joint::name.run_if(snapshot::was_restored),
             joint::gather.run_if(joint::any),
             gather::forces,
             zones::act,

@@ -79,7 +79,8 @@ pub struct Forces(pub Vec<ForceField<f32>>);
 /// change components instead: components and resources are the truth. With the next
 /// step its model, gravity, forces and walls are again what they say, entities that
 /// lost their rows have new ones, and rows that no entity stands behind are taken out
-/// and told as [`RowRemoved`](crate::snapshot::RowRemoved).
+/// and told as [`RowRemoved`](crate::snapshot::RowRemoved): marbles, walls, bodies and balls. Joints that the game
+/// puts in by itself stay until one of their ends goes.
 ///
 /// To go back in time, take a [`TawWorld::snapshot`] and [`TawWorld::restore`] it.
 #[derive(Resource, Debug, Default, Deref, DerefMut)]
