@@ -387,3 +387,31 @@ fn a_body_that_no_entity_stands_behind_is_taken_out_and_told() {
     assert!(matches!(told[..], [RowRemoved::Body(_)]), "{told:?}");
     assert!(app.world().resource::<TawWorld>().bodies.is_empty());
 }
+
+/// A joint that goes between a restore and the next step leaves alone which joint has its row by then.
+#[test]
+fn a_joint_that_goes_takes_no_other_out_of_a_restored_world() {
+    let mut app = app();
+    let bob = (Body::from(Sphere::new(0.1)), Transform::from_xyz(0.0, 5.0, 0.0));
+    let bob = app.world_mut().spawn(bob).id();
+    let kind = JointKind::Distance([0.0, 1.0]);
+    let rope = Joint::new(kind, JointEnd::world(Vec3::Y * 5.0), JointEnd::on(bob, Vec3::ZERO));
+    scene::frames(&mut app, 2);
+    let without = app.world().resource::<TawWorld>().snapshot();
+    let mut spawn = || {
+        app.world_mut().resource_mut::<TawWorld>().restore(&without);
+        let joint = app.world_mut().spawn(rope).id();
+        scene::frames(&mut app, 1);
+        let world = app.world().resource::<TawWorld>();
+        let (id, saved) = (world.joint_id(joint), world.snapshot());
+        app.world_mut().entity_mut(joint).insert(Disabled);
+        (joint, id, saved)
+    };
+    let [(first, id, saved), (second, same, _)] = [spawn(), spawn()];
+    assert_eq!(id, same, "both had the same row, each in its time");
+    app.world_mut().entity_mut(first).remove::<Disabled>();
+    app.world_mut().resource_mut::<TawWorld>().restore(&saved);
+    app.world_mut().despawn(second);
+    let world = app.world().resource::<TawWorld>();
+    assert_eq!((world.joints.len(), world.joint_id(first)), (1, id));
+}

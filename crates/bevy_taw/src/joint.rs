@@ -435,7 +435,9 @@ pub(crate) fn report_broken(
 pub(crate) fn forget(removed: On<Remove, Joint>, mut app: DeferredWorld) {
     let id = app.get::<JointState>(removed.entity).and_then(|state| state.id);
     let mut world = app.resource_mut::<TawWorld>();
-    if let Some(id) = id {
+    if let Some(id) = id
+        && world.joint_entities.get(&id) == Some(&removed.entity)
+    {
         let _ = world.joints.remove(id); // or it broke, or an end went
         world.joint_entities.remove(&id);
     }
