@@ -8,14 +8,15 @@ use taw::body::BodyId;
 
 use crate::body::{Body, BodySettings, BodyState, SeenBody, pose};
 use crate::components::{
-    AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, MarbleDamping, MarbleMass,
-    Sleeping, SleepingDisabled, SurfaceMaterial, Velocity, bits, rotation_bits,
+    AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping,
+    MarbleMass, Sleeping, SleepingDisabled, SurfaceMaterial, Velocity, bits, rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::layers::CollisionLayers;
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
 use crate::snapshot::RowRemoved;
+use crate::wall::Wall;
 
 /// Optional components of a body that are settings.
 type SettingComponents<'a> = (
@@ -35,6 +36,7 @@ pub(crate) struct BodyComponents {
     body: Ref<'static, Body>,
     transform: &'static Transform,
     is_child: Has<ChildOf>,
+    is_also: (Has<Marble>, Has<Wall>),
     velocity: Option<&'static Velocity>,
     spin: Option<&'static AngularVelocity>,
     settings: SettingComponents<'static>,
@@ -72,12 +74,24 @@ impl BodyComponentsItem<'_, '_> {
         Ok(())
     }
 
+    /// Checks that the entity can be a body.
+    fn check(&self, is_known: bool) -> Result<(), Refusal> {
+        let response = "a response other than SoftStep";
+        match self.is_also {
+            (true, _) => Err(Refusal::BodyAndMarble),
+            (_, true) => Err(Refusal::BodyAndWall),
+            _ if is_known => Ok(()),
+            _ => Err(taw::Error::Unsupported { response, feature: "rigid bodies" }.into()),
+        }
+    }
+
     /// Takes the body out of the world until it comes back.
-    fn leave(&mut self, world: &mut TawWorld) {
+    fn leave(&mut self, world: &mut TawWorld, commands: &mut Commands) {
         if let Some(id) = self.state.id.take() {
             world.body_entities.remove(&id);
             // It can only be gone already if the game took it out by itself.
             self.state.away = world.bodies.remove(id).ok().map(Box::new);
+            commands.entity(self.entity).try_remove::<Sleeping>(); // what is away is awake when it comes back
         }
     }
 
@@ -151,16 +165,11 @@ pub(crate) fn gather(
     let restored = world.just_restored;
     for mut it in &mut bodies {
         let entity = it.entity;
-        if !is_known || it.is_disabled {
-            let was_in = it.state.id.is_some();
-            it.leave(&mut world);
-            if was_in {
-                commands.entity(entity).try_remove::<Sleeping>(); // what is away is awake when it comes back
-            }
-            if !is_known && !it.is_disabled {
-                let response = "a response other than SoftStep";
-                let error = taw::Error::Unsupported { response, feature: "rigid bodies" };
-                refusals.check(Some(entity), Err::<(), _>(error));
+        let checked = it.check(is_known);
+        if it.is_disabled || checked.is_err() {
+            it.leave(&mut world, &mut commands);
+            if !it.is_disabled {
+                refusals.check(Some(entity), checked);
             }
             continue;
         }
