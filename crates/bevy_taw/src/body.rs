@@ -27,8 +27,10 @@ use crate::scatter::{Frame, put};
 /// Bodies need [`Response::SoftStep`](taw::response::Response::SoftStep), the default. They are in no message of
 /// contacts, sensor or query yet, and are no ground of [`Grounded`](crate::grounded::Grounded), from which a
 /// [`MarbleController`](crate::controller::MarbleController) could jump. Force fields and zones do not act on them. On a
-/// body, `LockedAxes`, `ColliderDisabled`, `IgnoreCollisions`, `ContactForce`, `SurfaceVelocity` and `OneWay` do nothing.
-/// By default it is of glass, like marbles: a box of 40 cm has 160 kg, which motors have to move.
+/// body, `LockedAxes`, `ColliderDisabled`, `IgnoreCollisions`, `ContactForce`, `SurfaceVelocity` and `OneWay` do nothing,
+/// as [`IgnoredComponents`](crate::ignored::IgnoredComponents) says. An entity that is also a
+/// [`Marble`](crate::components::Marble) or a [`Wall`](crate::wall::Wall) is that only, and no body, and told as
+/// [`InputRefused`](crate::refusal::InputRefused). By default it is of glass, like marbles: a box of 40 cm has 160 kg, which motors have to move.
 ///
 /// ```
 /// use bevy::prelude::*;
