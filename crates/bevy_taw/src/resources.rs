@@ -1,6 +1,6 @@
 //! Resources: the model, gravity, the world.
 
-use bevy::platform::collections::HashMap;
+use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 use taw::body::BodyId;
 use taw::joint::JointId;
@@ -98,6 +98,8 @@ pub struct TawWorld {
     pub(crate) sensed: HashMap<(SensorId, MarbleId), Entity>,
     /// Balls of swarms inside of sensors, sorted; none while nobody listens.
     pub(crate) sensed_balls: Vec<SensedBall>,
+    /// Sensors and the marbles inside of them by which a restore is not told yet.
+    pub(crate) sensed_before: Option<HashSet<(Entity, Entity)>>,
     /// Events [`SensorLeft`](crate::sensor::SensorLeft) that are not sent yet: sensor and marble.
     pub(crate) left_sensors: Vec<(Entity, Entity)>,
     /// Sensor entities whose list of marbles inside is out of date.
