@@ -8,7 +8,7 @@ use bevy_taw::snapshot::RowRemoved;
 
 use crate::scene;
 
-fn app() -> App {
+pub fn app() -> App {
     let mut app = scene::app();
     app.insert_resource(TawModel(Model::GAME));
     app.world_mut().spawn(Wall::HalfSpace(Dir3::Y));
@@ -272,4 +272,146 @@ fn a_hinge_driven_to_an_angle_tells_it() {
     assert!((angle - 0.7).abs() < 1e-3, "{angle}");
     let drawn = transform(&app, arm).rotation.angle_between(Quat::from_rotation_z(0.7));
     assert!(drawn < 1e-3, "{drawn}");
+}
+
+/// What is written to a child while an ancestor has no `Transform` counts once it has one.
+#[test]
+fn a_child_body_goes_where_it_was_written_once_it_has_a_place() {
+    let mut app = app();
+    app.insert_resource(Gravity(Vec3::ZERO));
+    let at = Transform::from_xyz(1.0, 0.0, 0.0);
+    let parent = app.world_mut().spawn(at).id();
+    let child = (Body::from(Sphere::new(0.1)), Velocity::default(), ChildOf(parent));
+    let child = app.world_mut().spawn((child, Transform::from_xyz(0.0, 5.0, 0.0))).id();
+    scene::frames(&mut app, 2);
+    app.world_mut().entity_mut(parent).remove::<Transform>();
+    scene::frames(&mut app, 2);
+    app.world_mut().get_mut::<Transform>(child).unwrap().translation.y = 7.0;
+    **app.world_mut().get_mut::<Velocity>(child).unwrap() = Vec3::Z;
+    scene::frames(&mut app, 2);
+    assert_eq!(truth(&app, child), Vec3::new(1.0, 5.0, 0.0), "nobody can say where it is");
+    app.world_mut().entity_mut(parent).insert(at);
+    scene::frames(&mut app, 1);
+    assert_eq!(truth(&app, child), Vec3::new(1.0, 7.0, scene::STEP));
+    assert_eq!(transform(&app, child).translation, Vec3::new(0.0, 7.0, scene::STEP));
+}
+
+/// Place of a marble or body in the physics.
+pub fn truth(app: &App, entity: Entity) -> Vec3 {
+    place_in(app.world().resource(), entity)
+}
+
+fn place_in(world: &TawWorld, entity: Entity) -> Vec3 {
+    let marble = (0..world.marbles.len())
+        .find(|row| world.marble_entity(*row as u32) == Some(entity))
+        .map(|row| world.marbles.position()[row]);
+    let body = world.body_id(entity).map(|id| world.bodies.motion(id).unwrap().position);
+    let place = marble.or(body).expect("it is in the world");
+    Vec3::new(place.x, place.y, place.z)
+}
+
+/// Marbles and bodies, each carried by the one before.
+#[derive(Resource)]
+pub struct Chain(Vec<Entity>);
+
+/// Adds three marbles or bodies above an entity, each carried by the one before. They move on by 0.1, 0.2 and 0.3 m a
+/// step and turn. The bits of `kinds` say which are bodies.
+pub fn carry(app: &mut App, root: Entity, kinds: u8) -> Vec<Entity> {
+    let mut chain = vec![root];
+    for i in 0..3_u8 {
+        let velocity = Vec3::X * 0.1 * f32::from(i + 1) / scene::STEP;
+        let motion = (Velocity(velocity), AngularVelocity(Vec3::ONE * 3.0));
+        let at = Transform::from_xyz(0.0, 3.0, 0.0);
+        let it = (motion, at, ChildOf(chain[usize::from(i)]));
+        let it = if kinds & (1 << i) == 0 {
+            app.world_mut().spawn((Marble::new(0.1), it)).id()
+        } else {
+            app.world_mut().spawn((Body::from(Cuboid::new(0.2, 0.2, 0.2)), it)).id()
+        };
+        chain.push(it);
+    }
+    chain.remove(0);
+    app.insert_resource(Chain(chain.clone()));
+    chain
+}
+
+/// Asserts that the `Transform`s of a chain are where the physics has it.
+pub fn are_true(world: Res<TawWorld>, chain: Res<Chain>, places: TransformHelper) {
+    for it in &chain.0 {
+        let place = places.compute_global_transform(*it).unwrap().translation();
+        let far = place.distance(place_in(&world, *it));
+        assert!(far < 1e-3, "{far} m");
+    }
+}
+
+#[test]
+fn what_marbles_and_bodies_carry_is_written_in_the_same_step() {
+    for kinds in 0..8 {
+        let mut app = app();
+        app.insert_resource(Gravity(Vec3::ZERO));
+        let root = app.world_mut().spawn(Transform::default()).id();
+        let chain = carry(&mut app, root, kinds);
+        app.add_systems(FixedUpdate, are_true.after(TawSystems::Scatter));
+        scene::frames(&mut app, 65);
+        let way = truth(&app, chain[2]).x - 0.3;
+        assert!((way - 0.3 * 64.0).abs() < 1e-2, "{kinds}: {way} m");
+    }
+}
+
+#[test]
+fn a_body_that_the_game_takes_out_comes_again_and_is_no_ghost() {
+    let mut app = app();
+    app.insert_resource(Gravity(Vec3::ZERO));
+    let at = Transform::from_xyz(0.0, 5.0, 0.0);
+    let body = app.world_mut().spawn((Body::default(), at)).id();
+    for _ in 0..8 {
+        scene::frames(&mut app, 2);
+        let mut world = app.world_mut().resource_mut::<TawWorld>();
+        let id = world.body_id(body).unwrap();
+        assert!(world.bodies.remove(id).is_ok(), "it is named by the row that it has");
+    }
+}
+
+#[test]
+fn a_body_that_no_entity_stands_behind_is_taken_out_and_told() {
+    let mut app = app();
+    let body = app.world_mut().spawn(Body::default()).id();
+    scene::frames(&mut app, 2);
+    let clone = (**app.world().resource::<TawWorld>()).clone();
+    app.world_mut().despawn(body);
+    scene::frames(&mut app, 2);
+    **app.world_mut().resource_mut::<TawWorld>() = clone;
+    app.update();
+    let told = app.world().resource::<Messages<RowRemoved>>();
+    let told: Vec<_> = told.iter_current_update_messages().collect();
+    assert!(matches!(told[..], [RowRemoved::Body(_)]), "{told:?}");
+    assert!(app.world().resource::<TawWorld>().bodies.is_empty());
+}
+
+/// A joint that goes between a restore and the next step leaves alone which joint has its row by then.
+#[test]
+fn a_joint_that_goes_takes_no_other_out_of_a_restored_world() {
+    let mut app = app();
+    let bob = (Body::from(Sphere::new(0.1)), Transform::from_xyz(0.0, 5.0, 0.0));
+    let bob = app.world_mut().spawn(bob).id();
+    let kind = JointKind::Distance([0.0, 1.0]);
+    let rope = Joint::new(kind, JointEnd::world(Vec3::Y * 5.0), JointEnd::on(bob, Vec3::ZERO));
+    scene::frames(&mut app, 2);
+    let without = app.world().resource::<TawWorld>().snapshot();
+    let mut spawn = || {
+        app.world_mut().resource_mut::<TawWorld>().restore(&without);
+        let joint = app.world_mut().spawn(rope).id();
+        scene::frames(&mut app, 1);
+        let world = app.world().resource::<TawWorld>();
+        let (id, saved) = (world.joint_id(joint), world.snapshot());
+        app.world_mut().entity_mut(joint).insert(Disabled);
+        (joint, id, saved)
+    };
+    let [(first, id, saved), (second, same, _)] = [spawn(), spawn()];
+    assert_eq!(id, same, "both had the same row, each in its time");
+    app.world_mut().entity_mut(first).remove::<Disabled>();
+    app.world_mut().resource_mut::<TawWorld>().restore(&saved);
+    app.world_mut().despawn(second);
+    let world = app.world().resource::<TawWorld>();
+    assert_eq!((world.joints.len(), world.joint_id(first)), (1, id));
 }

@@ -3,6 +3,7 @@
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
 
+use crate::bodies::{are_true, carry, truth};
 use crate::scene::{self, STEP};
 
 /// A marble that moves 1 m per step along x, drawn four times per step.
@@ -266,6 +267,69 @@ fn a_child_of_what_moves_in_every_frame_is_drawn_where_it_is() {
             assert!((way - Vec3::X * speed / 4.0).length() < 1e-4, "frame {frame}: {way}");
             last = now;
         }
+    }
+}
+
+/// In the fixed schedules, all of them are where they truly are.
+#[test]
+fn what_marbles_and_bodies_carry_is_drawn_on_its_own_way() {
+    for kinds in 0..8 {
+        let mut app = scene::smooth_app();
+        app.insert_resource(TawModel(Model::GAME)).insert_resource(Gravity(Vec3::ZERO));
+        scene::frame_length(&mut app, STEP / 4.0);
+        let root = app.world_mut().spawn(Transform::default()).id();
+        let chain = carry(&mut app, root, kinds);
+        let turn = move |mut transforms: Query<&mut Transform>| {
+            let mut carrier = transforms.get_mut(root).unwrap();
+            carrier.translation.z += 0.2;
+            carrier.rotate_y(0.03);
+        };
+        scene::frames(&mut app, 8);
+        app.add_systems(FixedUpdate, are_true.before(TawSystems::Gather)).add_systems(Update, turn);
+        let places = |app: &App| {
+            let place = |it| app.world().get::<GlobalTransform>(it).unwrap().translation();
+            [chain[0], chain[1], chain[2]].map(place)
+        };
+        let mut last = places(&app);
+        for frame in 0..40 {
+            app.update();
+            let now = places(&app);
+            for (i, speed) in [0.1, 0.2, 0.3].into_iter().enumerate() {
+                let off = now[i] - last[i] - Vec3::X * speed / 4.0;
+                assert!(off.length() < 1e-3, "bodies {kinds:b}, frame {frame}, {i}: {off}");
+            }
+            last = now;
+        }
+    }
+}
+
+/// A wall on a body is drawn with it, and a body on a wall on its own way.
+#[test]
+fn walls_and_bodies_on_each_other_are_drawn_where_they_are() {
+    let mut app = scene::smooth_app();
+    app.insert_resource(TawModel(Model::GAME)).insert_resource(Gravity(Vec3::ZERO));
+    scene::frame_length(&mut app, STEP / 4.0);
+    let body = |height: f32, velocity: Vec3| {
+        (Body::default(), Velocity(velocity), Transform::from_xyz(0.0, height, 0.0))
+    };
+    let carrier = app.world_mut().spawn(body(9.0, Vec3::X * 8.0)).id();
+    let wall = || (Wall::from(Cuboid::default()), Transform::from_xyz(0.0, 3.0, 0.0));
+    let on_body = app.world_mut().spawn((wall(), ChildOf(carrier))).id();
+    let lift = app.world_mut().spawn((Lift, wall())).id();
+    let on_wall = app.world_mut().spawn((body(-3.0, Vec3::ZERO), ChildOf(lift))).id();
+    let rise = |mut lifts: Query<&mut Transform, With<Lift>>| {
+        lifts.iter_mut().for_each(|mut place| place.translation.z += 0.1);
+    };
+    app.add_systems(FixedUpdate, rise.before(TawSystems::Gather));
+    scene::frames(&mut app, 8);
+    for frame in 0..20 {
+        app.update();
+        let drawn = |it| app.world().get::<GlobalTransform>(it).unwrap().translation();
+        assert_eq!(drawn(carrier), scene::position(&app, carrier), "frame {frame}");
+        let above = drawn(on_body) - drawn(carrier) - Vec3::Y * 3.0;
+        assert!(above.length() < 1e-4, "frame {frame}: {above}");
+        let off = drawn(on_wall) - truth(&app, on_wall);
+        assert!(off.length() < 1e-4, "frame {frame}: {off}");
     }
 }
 

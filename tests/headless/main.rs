@@ -5,6 +5,7 @@ mod balls;
 mod blender;
 mod board;
 mod bodies;
+mod bodies_refused;
 mod capsules;
 mod contact_forces;
 mod contact_points;

@@ -153,3 +153,42 @@ fn a_swarm_keeps_what_it_had_and_loses_what_is_nobodys() {
     assert_eq!(app.world().resource::<Messages<RowRemoved>>().len(), 50);
     scene::frames(&mut app, 100);
 }
+
+/// Who listens to sensors knows who is inside, also after a restore.
+#[test]
+fn who_is_in_a_sensor_of_a_restored_world_is_told() {
+    let mut app = scene::app();
+    app.insert_resource(Gravity(Vec3::ZERO)).insert_resource(TawModel(Model::GAME));
+    let zone = (Wall::from(Cuboid::from_length(2.0)), Sensor);
+    let zone = app.world_mut().spawn(zone).id();
+    let marbles = [0.0, 9.0, 0.5, 0.8].map(|x| scene::drop_marble(&mut app, 0.1, Vec3::X * x));
+    let [goes, comes, stays, dies] = marbles;
+    scene::frames(&mut app, 2);
+    let saved = app.world().resource::<TawWorld>().snapshot();
+    let put = |app: &mut App, marble: Entity, x: f32| {
+        app.world_mut().get_mut::<Transform>(marble).unwrap().translation.x = x;
+    };
+    put(&mut app, goes, -9.0);
+    put(&mut app, comes, 0.0);
+    app.world_mut().despawn(dies);
+    scene::frames(&mut app, 3);
+    let there = |app: &App| app.world().get::<CollidingEntities>(zone).unwrap().to_vec();
+    let sorted = |mut all: [Entity; 2]| {
+        all.sort_unstable();
+        all
+    };
+    assert_eq!(there(&app), sorted([comes, stays]));
+    for (entered, left) in [(vec![goes], vec![comes]), (vec![], vec![])] {
+        app.world_mut().resource_mut::<TawWorld>().restore(&saved);
+        app.world_mut().resource_mut::<TawWorld>().restore(&saved);
+        app.update();
+        let messages = app.world().resource::<Messages<SensorEntered>>();
+        let told: Vec<_> = messages.iter_current_update_messages().map(|it| it.marble).collect();
+        assert_eq!(told, entered);
+        let messages = app.world().resource::<Messages<SensorLeft>>();
+        let told: Vec<_> = messages.iter_current_update_messages().map(|it| it.marble).collect();
+        assert_eq!(told, left);
+        assert_eq!(there(&app), sorted([goes, stays]));
+        scene::frames(&mut app, 3);
+    }
+}

@@ -1,7 +1,6 @@
 //! Rigid bodies: boxes, capsules, hulls and compounds that move and turn.
 
 use bevy::ecs::world::DeferredWorld;
-use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use taw::body as core;
 use taw::body::BodyId;
@@ -28,8 +27,10 @@ use crate::scatter::{Frame, put};
 /// Bodies need [`Response::SoftStep`](taw::response::Response::SoftStep), the default. They are in no message of
 /// contacts, sensor or query yet, and are no ground of [`Grounded`](crate::grounded::Grounded), from which a
 /// [`MarbleController`](crate::controller::MarbleController) could jump. Force fields and zones do not act on them. On a
-/// body, `LockedAxes`, `ColliderDisabled`, `IgnoreCollisions`, `ContactForce`, `SurfaceVelocity` and `OneWay` do nothing.
-/// By default it is of glass, like marbles: a box of 40 cm has 160 kg, which motors have to move.
+/// body, `LockedAxes`, `ColliderDisabled`, `IgnoreCollisions`, `ContactForce`, `SurfaceVelocity` and `OneWay` do nothing,
+/// as [`IgnoredComponents`](crate::ignored::IgnoredComponents) says. An entity that is also a
+/// [`Marble`](crate::components::Marble) or a [`Wall`](crate::wall::Wall) is that only, and no body, and told as
+/// [`InputRefused`](crate::refusal::InputRefused). By default it is of glass, like marbles: a box of 40 cm has 160 kg, which motors have to move.
 ///
 /// ```
 /// use bevy::prelude::*;
@@ -186,7 +187,7 @@ pub(crate) struct BodySettings {
     pub sleeping_disabled: bool,
 }
 
-type MovedBody<'a> = (
+pub(crate) type MovedBody<'a> = (
     Entity,
     &'a mut Transform,
     Option<&'a mut Velocity>,
@@ -194,48 +195,54 @@ type MovedBody<'a> = (
     Has<Sleeping>,
     &'a mut BodyState,
 );
+type MovedBodyItem<'a> = (
+    Entity,
+    Mut<'a, Transform>,
+    Option<Mut<'a, Velocity>>,
+    Option<Mut<'a, AngularVelocity>>,
+    bool,
+    Mut<'a, BodyState>,
+);
 
-/// Writes `Transform`, `Velocity` and `AngularVelocity` of the bodies that moved, and who sleeps.
+/// Writes the bodies that are no children.
 pub(crate) fn scatter(
     world: Res<TawWorld>,
-    mut transforms: ParamSet<(TransformHelper, Query<MovedBody, With<Body>>)>,
-    children: Query<(Entity, &ChildOf), With<Body>>,
+    mut bodies: Query<MovedBody, (With<Body>, Without<ChildOf>)>,
     mut commands: Commands,
 ) {
-    let helper = transforms.p0();
-    let frames = children.iter().filter_map(|(entity, child_of)| {
-        let parent = helper.compute_global_transform(child_of.parent()).ok()?;
-        Some((entity, Frame::new(&parent)))
-    });
-    let frames: HashMap<_, _> = frames.collect();
-    for (entity, mut transform, velocity, spin, sleeping, mut state) in &mut transforms.p1() {
-        let Some(body) = state.id.and_then(|id| world.bodies.motion(id).ok()) else { continue };
-        let frame = match frames.get(&entity) {
-            None => Frame::WORLD,
-            Some(Some(frame)) => *frame,
-            Some(None) => continue, // there is no way back from a scale of zero
-        };
-        let (position, rotation) = (from_point(body.position), from_rotation(body.rotation));
-        put(&mut transform, &mut state, &frame, Some(position), Some(rotation));
-        if let Some(mut velocity) = velocity {
-            let now = from_vector(body.velocity);
-            state.seen.velocity[0] = Some(bits(now));
-            velocity.set_if_neq(Velocity(now));
+    for moved in &mut bodies {
+        write(&world, moved, &Frame::WORLD, &mut commands);
+    }
+}
+
+/// Writes `Transform`, `Velocity` and `AngularVelocity` of a body that moved, and whether it sleeps.
+pub(crate) fn write(
+    world: &TawWorld,
+    (entity, mut transform, velocity, spin, sleeping, mut state): MovedBodyItem,
+    frame: &Frame,
+    commands: &mut Commands,
+) {
+    let Some(body) = state.id.and_then(|id| world.bodies.motion(id).ok()) else { return };
+    let (position, rotation) = (from_point(body.position), from_rotation(body.rotation));
+    put(&mut transform, &mut state, frame, Some(position), Some(rotation));
+    if let Some(mut velocity) = velocity {
+        let now = from_vector(body.velocity);
+        state.seen.velocity[0] = Some(bits(now));
+        velocity.set_if_neq(Velocity(now));
+    }
+    if let Some(mut spin) = spin {
+        let now = from_vector(body.angular_velocity);
+        state.seen.velocity[1] = Some(bits(now));
+        spin.set_if_neq(AngularVelocity(now));
+    }
+    match (body.is_asleep, sleeping) {
+        (true, false) => {
+            commands.entity(entity).try_insert(Sleeping);
         }
-        if let Some(mut spin) = spin {
-            let now = from_vector(body.angular_velocity);
-            state.seen.velocity[1] = Some(bits(now));
-            spin.set_if_neq(AngularVelocity(now));
+        (false, true) => {
+            commands.entity(entity).try_remove::<Sleeping>();
         }
-        match (body.is_asleep, sleeping) {
-            (true, false) => {
-                commands.entity(entity).try_insert(Sleeping);
-            }
-            (false, true) => {
-                commands.entity(entity).try_remove::<Sleeping>();
-            }
-            _ => {}
-        }
+        _ => {}
     }
 }
 

@@ -8,14 +8,15 @@ use taw::body::BodyId;
 
 use crate::body::{Body, BodySettings, BodyState, SeenBody, pose};
 use crate::components::{
-    AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, MarbleDamping, MarbleMass,
-    Sleeping, SleepingDisabled, SurfaceMaterial, Velocity, bits, rotation_bits,
+    AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping,
+    MarbleMass, Sleeping, SleepingDisabled, SurfaceMaterial, Velocity, bits, rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::layers::CollisionLayers;
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
 use crate::snapshot::RowRemoved;
+use crate::wall::Wall;
 
 /// Optional components of a body that are settings.
 type SettingComponents<'a> = (
@@ -35,6 +36,7 @@ pub(crate) struct BodyComponents {
     body: Ref<'static, Body>,
     transform: &'static Transform,
     is_child: Has<ChildOf>,
+    is_also: (Has<Marble>, Has<Wall>),
     velocity: Option<&'static Velocity>,
     spin: Option<&'static AngularVelocity>,
     settings: SettingComponents<'static>,
@@ -72,12 +74,24 @@ impl BodyComponentsItem<'_, '_> {
         Ok(())
     }
 
+    /// Checks that the entity can be a body.
+    fn check(&self, is_known: bool) -> Result<(), Refusal> {
+        let response = "a response other than SoftStep";
+        match self.is_also {
+            (true, _) => Err(Refusal::BodyAndMarble),
+            (_, true) => Err(Refusal::BodyAndWall),
+            _ if is_known => Ok(()),
+            _ => Err(taw::Error::Unsupported { response, feature: "rigid bodies" }.into()),
+        }
+    }
+
     /// Takes the body out of the world until it comes back.
-    fn leave(&mut self, world: &mut TawWorld) {
+    fn leave(&mut self, world: &mut TawWorld, commands: &mut Commands) {
         if let Some(id) = self.state.id.take() {
             world.body_entities.remove(&id);
             // It can only be gone already if the game took it out by itself.
             self.state.away = world.bodies.remove(id).ok().map(Box::new);
+            commands.entity(self.entity).try_remove::<Sleeping>(); // what is away is awake when it comes back
         }
     }
 
@@ -133,9 +147,9 @@ impl BodyComponentsItem<'_, '_> {
     }
 }
 
-/// Run condition: there are bodies, also disabled ones.
-pub(crate) fn any(bodies: Query<(), (With<Body>, Allow<Disabled>)>) -> bool {
-    !bodies.is_empty()
+/// Run condition: there are bodies, also disabled ones, or rows that the game put in by itself.
+pub(crate) fn any(world: Res<TawWorld>, bodies: Query<(), (With<Body>, Allow<Disabled>)>) -> bool {
+    !(world.bodies.is_empty() && bodies.is_empty())
 }
 
 /// Puts new bodies in, and takes over what somebody else wrote since the last scatter.
@@ -143,7 +157,7 @@ pub(crate) fn gather(
     mut world: ResMut<TawWorld>,
     mut bodies: Query<BodyComponents, Allow<Disabled>>,
     transforms: TransformHelper,
-    (mut refusals, mut commands): (Refusals, Commands),
+    (mut refusals, mut removed, mut commands): (Refusals, MessageWriter<RowRemoved>, Commands),
     mut was_known: Local<bool>,
 ) {
     let is_known = world.model().response.knows_bodies();
@@ -151,23 +165,18 @@ pub(crate) fn gather(
     let restored = world.just_restored;
     for mut it in &mut bodies {
         let entity = it.entity;
-        if !is_known || it.is_disabled {
-            let was_in = it.state.id.is_some();
-            it.leave(&mut world);
-            if was_in {
-                commands.entity(entity).try_remove::<Sleeping>(); // what is away is awake when it comes back
-            }
-            if !is_known && !it.is_disabled {
-                let response = "a response other than SoftStep";
-                let error = taw::Error::Unsupported { response, feature: "rigid bodies" };
-                refusals.check(Some(entity), Err::<(), _>(error));
+        let checked = it.check(is_known);
+        if it.is_disabled || checked.is_err() {
+            it.leave(&mut world, &mut commands);
+            if !it.is_disabled {
+                refusals.check(Some(entity), checked);
             }
             continue;
         }
         let seen = it.seen();
         it.state.refused &= !again;
         it.state.id = it.state.id.filter(|id| world.bodies.motion(*id).is_ok());
-        let last = std::mem::replace(&mut it.state.seen, seen);
+        let last = it.state.seen;
         let is_settled = it.state.id.is_some() || it.state.refused && !it.is_child;
         if is_settled && last == seen && !it.body.is_changed() && !restored {
             continue;
@@ -182,6 +191,7 @@ pub(crate) fn gather(
         } else {
             (it.transform.translation, it.transform.rotation)
         };
+        it.state.seen = seen; // only now: what is written to a child without a place counts later
         match it.take_over(&mut world, place, (&last, &seen), restored) {
             Ok(id) => {
                 (it.state.id, it.state.refused, it.state.away) = (Some(id), false, None);
@@ -193,27 +203,37 @@ pub(crate) fn gather(
             }
         }
     }
+    // Somebody else changed bodies, or the world is another one.
+    let rows = bodies.iter().filter(|it| it.state.id.is_some()).count();
+    if [world.bodies.len(), world.body_entities.len()] != [rows; 2] {
+        take_out(&mut world, &bodies, &mut removed);
+    }
 }
 
-/// Gives body entities the rows that they have in a restored world, and takes out those that no entity stands behind.
-pub(crate) fn name(
-    mut world: ResMut<TawWorld>,
-    mut bodies: Query<&mut BodyState, Allow<Disabled>>,
-    mut removed: MessageWriter<RowRemoved>,
+/// Takes out the rows that no entity stands behind, and forgets the names of those that are gone.
+fn take_out(
+    world: &mut TawWorld,
+    bodies: &Query<BodyComponents, Allow<Disabled>>,
+    removed: &mut MessageWriter<RowRemoved>,
 ) {
+    let has_row = |id| bodies.get(*world.body_entities.get(&id)?).ok()?.state.id;
+    let gone: Vec<_> = world.bodies.ids().filter(|id| has_row(*id) != Some(*id)).collect();
+    for id in gone {
+        let _ = world.bodies.remove(id); // it is there: its row named it
+        log::warn!("taw took out {id:?}: no entity stands behind it");
+        removed.write(RowRemoved::Body(id));
+    }
+    world.body_entities.retain(|id, _| world.world.bodies.motion(*id).is_ok());
+}
+
+/// Gives body entities the rows that they have in a restored world.
+pub(crate) fn name(world: Res<TawWorld>, mut bodies: Query<&mut BodyState, Allow<Disabled>>) {
     for mut state in &mut bodies {
         (state.id, state.refused) = (None, false);
     }
-    let known: Vec<_> = world.body_entities.iter().map(|(id, entity)| (*id, *entity)).collect();
-    for (id, entity) in known {
-        if let Ok(mut state) = bodies.get_mut(entity) {
-            (state.id, state.away) = (Some(id), None);
-            continue;
-        }
-        world.body_entities.remove(&id);
-        if world.bodies.remove(id).is_ok() {
-            log::warn!("taw took out {id:?}: no entity stands behind it");
-            removed.write(RowRemoved::Body(id));
+    for (id, entity) in &world.body_entities {
+        if let Ok(mut state) = bodies.get_mut(*entity) {
+            (state.id, state.away) = (Some(*id), None);
         }
     }
 }

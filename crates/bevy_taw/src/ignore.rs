@@ -6,15 +6,17 @@ use std::collections::BTreeMap;
 use bevy::prelude::*;
 use taw::world::{ColliderId, MarbleId};
 
+use crate::body::Body;
 use crate::components::{MarbleState, WallState};
 use crate::convert::at_least_zero;
 use crate::pair_filter::FilteredPairs;
-use crate::refusal::Refusals;
+use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
 
 /// Marbles and walls that a marble passes through, whatever their
 /// [`CollisionLayers`](crate::layers::CollisionLayers). One of a pair is enough. May change at any time;
-/// entities that are no marbles or walls, or not yet, do no harm. Sensors, queries and balls of swarms
+/// entities that are no marbles or walls, or not yet, do no harm, and a [`Body`], which cannot be ignored, is
+/// [refused](Refusal::IgnoredBody) by name. Sensors, queries and balls of swarms
 /// do not go by it.
 ///
 /// ```
@@ -125,6 +127,8 @@ pub(crate) fn gather(
     filtered: Res<FilteredPairs>,
     marbles: Query<(Entity, &IgnoreCollisions), With<MarbleState>>,
     colliders: Query<(Option<&MarbleState>, Option<&WallState>)>,
+    bodies: Query<(), With<Body>>,
+    mut refusals: Refusals,
 ) {
     let collider = |entity: Entity| match colliders.get(entity).ok()? {
         (Some(MarbleState { id: Some(id), .. }), _) => Some(ColliderId::Marble(*id)),
@@ -137,8 +141,14 @@ pub(crate) fn gather(
     let filtered = filtered.pass().iter().map(|pair| (pair.b, pair.a));
     let mut ignored: BTreeMap<MarbleId, Vec<ColliderId>> = BTreeMap::new();
     for (marble, other) in named.chain(filtered) {
-        if let (Some(ColliderId::Marble(id)), Some(other)) = (collider(marble), collider(other)) {
-            ignored.entry(id).or_default().push(other);
+        match (collider(marble), collider(other)) {
+            (Some(ColliderId::Marble(id)), Some(other)) => {
+                ignored.entry(id).or_default().push(other);
+            }
+            (_, None) if bodies.contains(other) => {
+                refusals.check(Some(marble), Err(Refusal::IgnoredBody(other)));
+            }
+            _ => {}
         }
     }
     let over = world.marbles.ignoring().filter(|id| !ignored.contains_key(id));

@@ -8,6 +8,7 @@ use taw::motion::{Integrator, Rotation};
 use taw::response::Response;
 use taw::world::{Detection, Model, Precision};
 
+use crate::body::Body;
 use crate::components::{
     AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
     MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, SleepingDisabled, SurfaceMaterial,
@@ -33,8 +34,8 @@ use crate::wall::Wall;
 ///   integrator by `SoftStep` where no [`Forces`](crate::resources::Forces) act. (Its
 ///   `iterations` are not named: every model has some.)
 /// - a [`FilterPairs`] in an app without a [`PairFilter`];
-/// - components of marbles on walls, as a `Velocity`, those of walls on marbles, as a `OneWay`, and a
-///   `Sensor` or a zone without a [`Wall`].
+/// - components of marbles on walls, as a `Velocity`, those of walls on marbles, as a `OneWay`, those that a
+///   [`Body`] does not have, as `LockedAxes`, and a `Sensor` or a zone without a [`Wall`].
 ///
 /// Each is also logged as a warning, once until it has an effect. Updated in each step, in
 /// [`TawSystems::Gather`](crate::TawSystems::Gather).
@@ -48,7 +49,9 @@ struct Carriers<'a> {
     marbles: Vec<&'a Archetype>,
     /// Walls that are no marbles.
     walls: Vec<&'a Archetype>,
-    /// Sensors that are neither.
+    /// Bodies that are neither.
+    bodies: Vec<&'a Archetype>,
+    /// Sensors that are none of these.
     shapeless: Vec<&'a Archetype>,
 }
 
@@ -58,9 +61,9 @@ impl<'a> Carriers<'a> {
         components: &'a Components,
         hidden: &DefaultQueryFilters,
     ) -> Self {
-        let mut all =
-            Self { components, marbles: Vec::new(), walls: Vec::new(), shapeless: Vec::new() };
-        let (marble, wall) = (all.id::<Marble>(), all.id::<Wall>());
+        let [marbles, walls, bodies, shapeless] = [const { Vec::new() }; 4];
+        let mut all = Self { components, marbles, walls, bodies, shapeless };
+        let (marble, wall, body) = (all.id::<Marble>(), all.id::<Wall>(), all.id::<Body>());
         let (sensor, mesh) = (all.id::<Sensor>(), mesh_id(components));
         let has = |archetype: &Archetype, id: Option<ComponentId>| {
             id.is_some_and(|id| archetype.contains(id))
@@ -73,6 +76,8 @@ impl<'a> Carriers<'a> {
                 all.marbles.push(archetype);
             } else if has(archetype, wall) {
                 all.walls.push(archetype);
+            } else if has(archetype, body) {
+                all.bodies.push(archetype);
             } else if has(archetype, sensor) && !has(archetype, mesh) {
                 all.shapeless.push(archetype); // those with a mesh may await it
             }
@@ -115,6 +120,26 @@ impl<'a> Carriers<'a> {
             ("Model::integrator", is_parabola && integrator != Integrator::SemiImplicitEuler),
             ("Model::precision", soft && precision != Precision::Plain),
             ("Model::detection", is_continuous && detection == Detection::Discrete),
+        ]
+    }
+
+    /// Each name of a component that has no effect on a body, and true if one has it.
+    fn of_bodies(&self) -> [(&'static str, bool); 13] {
+        let bodies = &self.bodies;
+        [
+            ("LockedAxes of a body", self.any::<LockedAxes>(bodies)),
+            ("ColliderDisabled of a body", self.any::<ColliderDisabled>(bodies)),
+            ("IgnoreCollisions of a body", self.any::<IgnoreCollisions>(bodies)),
+            ("FilterPairs of a body", self.any::<FilterPairs>(bodies)),
+            ("ContactForce of a body", self.any::<ContactForce>(bodies)),
+            ("SurfaceVelocity of a body", self.any::<SurfaceVelocity>(bodies)),
+            ("OneWay of a body", self.any::<OneWay>(bodies)),
+            ("Sensor of a body", self.any::<Sensor>(bodies)),
+            ("HalfLength of a body", self.any::<HalfLength>(bodies)),
+            ("MarbleIntegrator of a body", self.any::<MarbleIntegrator>(bodies)),
+            ("MarbleRotation of a body", self.any::<MarbleRotation>(bodies)),
+            ("MarbleController of a body", self.any::<MarbleController>(bodies)),
+            ("Grounded of a body", self.any::<Grounded>(bodies)),
         ]
     }
 
@@ -182,7 +207,8 @@ pub(crate) fn find(
             if *name == "MarbleMass" { " in contacts" } else { "" }
         );
     }
-    let misplaced = without_effect(&carriers.of_places(filter.is_some()));
+    let mut misplaced = without_effect(&carriers.of_places(filter.is_some()));
+    misplaced.extend(without_effect(&carriers.of_bodies()));
     for name in misplaced.iter().filter(|name| !found.contains(name)) {
         log::warn!("without effect: {name}");
     }

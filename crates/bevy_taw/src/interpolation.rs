@@ -39,7 +39,7 @@ use crate::TawSystems;
 use crate::body::{Body, BodyState};
 use crate::components::{Eased, Marble, MarbleState, Teleport, bits, rotation_bits};
 use crate::convert::{from_point, to_point};
-use crate::placed::Placed;
+use crate::placed::{Placed, PlacedChildren};
 use crate::resources::TawWorld;
 use crate::scatter::{Frame, put};
 use crate::schedule::TawSchedule;
@@ -69,8 +69,7 @@ impl Plugin for TawInterpolationPlugin {
         app.register_required_components::<Body, Eased>();
         app.register_required_components::<Body, NoTranslationEasing>();
         app.register_required_components::<Body, NoRotationEasing>();
-        add::<MarbleState>(app, schedule.label());
-        add::<BodyState>(app, schedule.label());
+        add_easing(app, schedule.label());
         app.add_systems(
             PostUpdate,
             wall_drawing::draw.in_set(TransformSystems::Propagate).after(sync_simple_transforms),
@@ -78,15 +77,15 @@ impl Plugin for TawInterpolationPlugin {
     }
 }
 
-/// Adds the easing of marbles or of bodies.
-fn add<T: Placed>(app: &mut App, schedule: impl ScheduleLabel) {
+/// Adds the easing of marbles and bodies: those that are children come after all that may carry them.
+fn add_easing(app: &mut App, schedule: impl ScheduleLabel) {
     app.add_systems(
         RunFixedMainLoop,
         (
-            (undo::<T>, undo_children::<T>)
+            (undo::<MarbleState>, undo::<BodyState>, undo_children)
                 .chain()
                 .in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
-            (ease::<T>, ease_children::<T>)
+            (ease::<MarbleState>, ease::<BodyState>, draw_children)
                 .chain()
                 .in_set(RunFixedMainLoopSystems::AfterFixedMainLoop)
                 .after(TransformEasingSystems::Ease),
@@ -95,18 +94,33 @@ fn add<T: Placed>(app: &mut App, schedule: impl ScheduleLabel) {
     // By then, what carries them is where its last step took it.
     .add_systems(
         FixedFirst,
-        undo_children::<T>.after(TransformEasingSystems::Reset).before(TawSystems::Control),
+        undo_children.after(TransformEasingSystems::Reset).before(TawSystems::Control),
     )
-    .add_systems(schedule, note_start::<T>.after(TawSystems::Gather).before(TawSystems::Step))
-    // And by now, where this frame took it.
-    .add_systems(PostUpdate, ease_children::<T>.before(TransformSystems::Propagate));
+    .add_systems(
+        schedule,
+        (note_start::<MarbleState>, note_start::<BodyState>)
+            .after(TawSystems::Gather)
+            .before(TawSystems::Step),
+    );
 }
 
 type Drawn<'a, T> = (&'a mut T, &'a mut Transform, &'a mut Eased, Has<Teleport>);
 type Roots<'w, 's, T> =
     Query<'w, 's, Drawn<'static, T>, (Without<ChildOf>, Without<NoTransformEasing>)>;
-type Children<'w, 's, T> =
-    Query<'w, 's, (Drawn<'static, T>, Entity, &'static ChildOf), Without<NoTransformEasing>>;
+type Child<'a, T> =
+    (&'a mut T, &'a mut Transform, Option<&'a mut Eased>, Has<NoTransformEasing>, Has<Teleport>);
+type ChildItem<'a, T> = (Mut<'a, T>, Mut<'a, Transform>, Option<Mut<'a, Eased>>, bool, bool);
+
+/// Marbles and bodies, and places of what carries them.
+type Children<'w, 's, 'a, 'b> = ParamSet<
+    'w,
+    's,
+    (
+        Query<'a, 'b, Child<'static, MarbleState>>,
+        Query<'a, 'b, Child<'static, BodyState>>,
+        TransformHelper<'a, 'b>,
+    ),
+>;
 
 /// Notes where marbles are when a step begins.
 fn note_start<T: Placed>(world: Res<TawWorld>, mut marbles: Query<(&T, &mut Eased)>) {
@@ -120,54 +134,54 @@ fn note_start<T: Placed>(world: Res<TawWorld>, mut marbles: Query<(&T, &mut Ease
 fn ease<T: Placed>(world: Res<TawWorld>, time: Res<Time<Fixed>>, mut marbles: Roots<T>) {
     let part = time.overstep_fraction();
     marbles.par_iter_mut().for_each(|(state, transform, eased, _)| {
-        draw(&world, &eased, part, state, transform, &Frame::WORLD);
+        draw(&world, Some(&eased), part, (state, transform), &Frame::WORLD);
     });
 }
 
-/// Draws marbles that are children, wherever their parents are drawn.
-fn ease_children<T: Placed>(
+/// Draws marbles and bodies that are children, wherever their parents are drawn. Those that are not eased stay where
+/// they are while their parents move. Those that somebody moved are left where that is.
+pub(crate) fn draw_children(
     world: Res<TawWorld>,
     time: Res<Time<Fixed>>,
-    mut marbles: ParamSet<(Children<T>, TransformHelper)>,
-    mut frames: Local<Vec<(Entity, Frame)>>,
+    mut placed: Children,
+    children: PlacedChildren,
 ) {
     let part = time.overstep_fraction();
-    find_frames(&mut marbles, &mut frames);
-    let mut marbles = marbles.p0();
-    for (entity, frame) in &*frames {
-        if let Ok(((state, transform, eased, _), ..)) = marbles.get_mut(*entity) {
-            draw(&world, &eased, part, state, transform, frame);
+    for (child, parent) in children.in_order() {
+        let Some(frame) = Frame::of(parent, &placed.p2()) else { continue };
+        if let Ok(marble) = placed.p0().get_mut(child) {
+            draw_child(&world, part, marble, &frame);
+        }
+        if let Ok(body) = placed.p1().get_mut(child) {
+            draw_child(&world, part, body, &frame);
         }
     }
 }
 
-fn find_frames<T: Placed>(
-    marbles: &mut ParamSet<(Children<T>, TransformHelper)>,
-    frames: &mut Vec<(Entity, Frame)>,
+fn draw_child<T: Placed>(
+    world: &TawWorld,
+    part: f32,
+    (state, transform, eased, is_left_out, _): ChildItem<T>,
+    frame: &Frame,
 ) {
-    frames.clear();
-    let parents = marbles.p0();
-    let parents: Vec<_> = parents.iter().map(|(_, entity, of)| (entity, of.parent())).collect();
-    let helper = marbles.p1();
-    frames.extend(parents.into_iter().filter_map(|(entity, parent)| {
-        Some((entity, Frame::new(&helper.compute_global_transform(parent).ok()?)?))
-    }));
+    let eased = eased.as_deref().filter(|_| !is_left_out);
+    draw(world, eased, part, (state, transform), frame);
 }
 
+/// Draws what is eased between the last two steps, and the rest where it is.
 fn draw<T: Placed>(
     world: &TawWorld,
-    eased: &Eased,
+    eased: Option<&Eased>,
     part: f32,
-    mut state: Mut<T>,
-    mut transform: Mut<Transform>,
+    (mut state, mut transform): (Mut<T>, Mut<Transform>),
     frame: &Frame,
 ) {
     let Some((mut position, mut rotation)) = state.place(world) else { return };
-    if eased.restored == world.restored
-        && let Some((start, turned)) = eased.from
+    if let Some(Eased { from: Some((start, turned)), restored, .. }) = eased
+        && *restored == world.restored
     {
         // Who crossed a side of a periodic box did not come from the other one.
-        let start = from_point(world.nearest_image(to_point(start), to_point(position)));
+        let start = from_point(world.nearest_image(to_point(*start), to_point(position)));
         position = start.lerp(position, part);
         rotation = rotation.map(|end| turned.map_or(end, |start| start.slerp(end, part)));
     }
@@ -199,21 +213,29 @@ fn undo<T: Placed>(mut world: ResMut<TawWorld>, mut marbles: Roots<T>) {
 }
 
 /// Undoes the easing of children.
-fn undo_children<T: Placed>(
-    mut world: ResMut<TawWorld>,
-    mut marbles: ParamSet<(Children<T>, TransformHelper)>,
-    mut frames: Local<Vec<(Entity, Frame)>>,
-) {
-    find_frames(&mut marbles, &mut frames);
-    let mut marbles = marbles.p0();
-    for (entity, frame) in &*frames {
-        let Ok((marble, ..)) = marbles.get_mut(*entity) else { continue };
-        let (mut state, mut transform, mut eased, teleport) = marble;
-        let (again, transformed) = (state.reborrow(), transform.reborrow());
-        if !go_back(&world, again, transformed, eased.reborrow(), frame) {
-            let marble = (state, transform, eased, teleport);
-            take_over(world.bypass_change_detection(), marble, frame);
+fn undo_children(mut world: ResMut<TawWorld>, mut placed: Children, children: PlacedChildren) {
+    let world = world.bypass_change_detection();
+    for (child, parent) in children.in_order() {
+        let Some(frame) = Frame::of(parent, &placed.p2()) else { continue };
+        if let Ok(marble) = placed.p0().get_mut(child) {
+            undo_child(world, marble, &frame);
         }
+        if let Ok(body) = placed.p1().get_mut(child) {
+            undo_child(world, body, &frame);
+        }
+    }
+}
+
+fn undo_child<T: Placed>(
+    world: &mut TawWorld,
+    (mut state, mut transform, eased, is_left_out, teleport): ChildItem<T>,
+    frame: &Frame,
+) {
+    let Some(mut eased) = eased.filter(|_| !is_left_out) else {
+        return draw(world, None, 1.0, (state, transform), frame); // its parents went back
+    };
+    if !go_back(world, state.reborrow(), transform.reborrow(), eased.reborrow(), frame) {
+        take_over(world, (state, transform, eased, teleport), frame);
     }
 }
 

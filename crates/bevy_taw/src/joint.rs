@@ -1,5 +1,6 @@
 //! Joints between marbles, bodies and places in the world.
 
+use bevy::ecs::entity::Entities;
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::query::QueryData;
 use bevy::ecs::world::DeferredWorld;
@@ -13,7 +14,7 @@ use taw::world::MarbleId;
 use crate::body::{Body, BodyState};
 use crate::components::{Marble, MarbleState};
 use crate::convert::{to_rotation, to_vector};
-use crate::refusal::Refusals;
+use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
 use crate::snapshot::RowRemoved;
 
@@ -57,8 +58,9 @@ pub struct Joint {
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct JointEnd {
-    /// Marble or body, and no wall; none for a place in the world. One that is written elsewhere moves there within the next
-    /// step, and carries on what hangs on it: so a joint hangs on a wall that moves, which is no end itself.
+    /// Marble or body, and no wall, which is [refused](Refusal::JointEnd) by name; none for a place in the world. One that
+    /// is written elsewhere moves there within the next step, and carries on what hangs on it: so a joint hangs on a wall
+    /// that moves, which is no end itself.
     pub entity: Option<Entity>,
     /// Anchor in the frame of the entity, or in the world, in metres.
     pub anchor: Vec3,
@@ -288,18 +290,22 @@ enum Found {
     There(core::JointEnd<f32>),
     /// Its entity is out of the world for a time: disabled, refused, or not there yet.
     Away,
-    /// Its entity is neither a marble nor a body, or none any more.
+    /// Its entity is neither a marble nor a body.
+    Other(Entity),
+    /// Its entity is none any more.
     Gone,
 }
 
 impl JointEnd {
-    fn find(&self, held: &Held, world: &TawWorld) -> Found {
+    fn find(&self, held: &Held, entities: &Entities, world: &TawWorld) -> Found {
         let frame =
             Pose { rotation: to_rotation(self.rotation), translation: to_vector(self.anchor) };
         let Some(entity) = self.entity else {
             return Found::There(core::JointEnd::World { frame });
         };
-        let Ok((marble, body)) = held.get(entity) else { return Found::Gone };
+        let Ok((marble, body)) = held.get(entity) else {
+            return if entities.contains(entity) { Found::Other(entity) } else { Found::Gone };
+        };
         let marble = marble.and_then(|it| it.id).filter(|id| world.marbles.row(*id).is_ok());
         match (marble, body.and_then(|it| it.id)) {
             (Some(marble), _) => Found::There(core::JointEnd::Marble { marble, frame }),
@@ -351,7 +357,7 @@ pub(crate) fn any(joints: Query<(), (With<Joint>, Allow<Disabled>)>) -> bool {
 pub(crate) fn gather(
     mut world: ResMut<TawWorld>,
     mut joints: Query<JointComponents, Allow<Disabled>>,
-    held: Held,
+    (held, entities): (Held, &Entities),
     mut refusals: Refusals,
     mut commands: Commands,
 ) {
@@ -359,9 +365,19 @@ pub(crate) fn gather(
     let restored = world.just_restored;
     for mut it in &mut joints {
         let entity = it.entity;
-        let ends = match it.joint.ends.each_ref().map(|end| end.find(&held, &world)) {
+        let ends = it.joint.ends.each_ref().map(|end| end.find(&held, entities, &world));
+        let ends = match ends {
             [Found::Gone, _] | [_, Found::Gone] => {
                 commands.entity(entity).try_remove::<Joint>();
+                continue;
+            }
+            [Found::Other(end), _] | [_, Found::Other(end)] => {
+                if it.state.id.is_some() && !it.joint.is_changed() {
+                    commands.entity(entity).try_remove::<Joint>(); // it was held until now
+                } else if !it.is_disabled {
+                    it.leave(&mut world);
+                    refusals.check(Some(entity), Err(Refusal::JointEnd(end)));
+                }
                 continue;
             }
             [Found::There(first), Found::There(second)] if is_known && !it.is_disabled => {
@@ -435,7 +451,9 @@ pub(crate) fn report_broken(
 pub(crate) fn forget(removed: On<Remove, Joint>, mut app: DeferredWorld) {
     let id = app.get::<JointState>(removed.entity).and_then(|state| state.id);
     let mut world = app.resource_mut::<TawWorld>();
-    if let Some(id) = id {
+    if let Some(id) = id
+        && world.joint_entities.get(&id) == Some(&removed.entity)
+    {
         let _ = world.joints.remove(id); // or it broke, or an end went
         world.joint_entities.remove(&id);
     }

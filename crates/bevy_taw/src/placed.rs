@@ -1,6 +1,7 @@
 //! Places of marbles and bodies, for what draws them and what puts them elsewhere.
 
 use bevy::ecs::component::Mutable;
+use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 use taw::frame::Pose;
 
@@ -23,6 +24,23 @@ pub(crate) trait Placed: Component<Mutability = Mutable> {
     fn set_position(&self, world: &mut TawWorld, position: Vec3) -> bool;
     /// Turns it. Returns false if that cannot be right.
     fn set_rotation(&self, world: &mut TawWorld, rotation: Quat) -> bool;
+}
+
+/// Marbles and bodies that are children.
+#[derive(SystemParam)]
+pub(crate) struct PlacedChildren<'w, 's> {
+    children: Query<'w, 's, (Entity, &'static ChildOf), Or<(With<MarbleState>, With<BodyState>)>>,
+    parents: Query<'w, 's, &'static ChildOf>,
+}
+
+impl PlacedChildren<'_, '_> {
+    /// Each with its parent, after all that carry it: only then is it known where its parent is.
+    pub fn in_order(&self) -> Vec<(Entity, Entity)> {
+        let mut children: Vec<_> =
+            self.children.iter().map(|(child, of)| (child, of.parent())).collect();
+        children.sort_by_cached_key(|(child, _)| self.parents.iter_ancestors(*child).count());
+        children
+    }
 }
 
 impl Placed for MarbleState {

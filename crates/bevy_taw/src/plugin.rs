@@ -3,11 +3,11 @@ use bevy::ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
 use bevy::prelude::*;
 use bevy_transform_interpolation::TransformEasingSystems;
 
-use crate::body::{Body, BodyState};
+use crate::body::Body;
 use crate::components::{
     AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Kinematic, Marble,
-    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, MarbleState, Sleeping,
-    SleepingDisabled, SurfaceMaterial, SurfaceVelocity, Teleport, Velocity,
+    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
+    SurfaceMaterial, SurfaceVelocity, Teleport, Velocity,
 };
 use crate::contact_force::{ContactForce, PairImpulses};
 use crate::contact_points::{self, Points};
@@ -16,7 +16,7 @@ use crate::diagnostics::{self, StepTimes};
 use crate::grounded::Grounded;
 use crate::ignore::{self, ColliderDisabled, IgnoreCollisions, OneWay};
 use crate::ignored::{self, IgnoredComponents};
-use crate::interpolation::TawInterpolationPlugin;
+use crate::interpolation::{self, TawInterpolationPlugin};
 use crate::joint::{Joint, JointBroken};
 use crate::layers::CollisionLayers;
 use crate::locked_axes::LockedAxes;
@@ -194,14 +194,7 @@ fn observe(app: &mut App) {
         .add_observer(swarm::forget)
         .add_observer(body::forget)
         .add_observer(joint::forget);
-    app.add_systems(
-        PostUpdate,
-        (
-            scatter::stay::<MarbleState>.run_if(scatter::any_child::<MarbleState>),
-            scatter::stay::<BodyState>.run_if(scatter::any_child::<BodyState>),
-        )
-            .before(TransformSystems::Propagate),
-    );
+    app.add_systems(PostUpdate, interpolation::draw_children.before(TransformSystems::Propagate));
     if TawSchedule::of(app).is_fixed(app.world()) {
         note_walls_between_steps(app);
     }
@@ -272,8 +265,9 @@ fn add_gather(app: &mut App) {
                 .chain()
                 .run_if(pair_filter::any),
             ignore::gather.run_if(ignore::any),
-            (gather_bodies::name, joint::name).chain().run_if(snapshot::was_restored),
+            gather_bodies::name.run_if(snapshot::was_restored),
             (gather_bodies::gather, gather_bodies::forces).chain().run_if(gather_bodies::any),
+            joint::name.run_if(snapshot::was_restored),
             joint::gather.run_if(joint::any),
             gather::forces,
             zones::act,
@@ -296,15 +290,15 @@ fn add_scatter(app: &mut App) {
             sleep::unmark,
             scatter::marbles,
             (
-                sleep::mark,
                 body::scatter.run_if(any_with_component::<Body>),
+                scatter::children,
+                sleep::mark,
                 joint::report_broken.run_if(any_with_component::<Joint>),
             )
                 .chain(),
             refusal::report_stopped,
             swarm::report_stopped,
-            sensor::scatter,
-            sensor::scatter_balls,
+            (snapshot::tell_sensed, sensor::scatter, sensor::scatter_balls).chain(),
             ball_sensor::write.run_if(ball_sensor::are_read),
             ball_sensor::forget.run_if(not(ball_sensor::are_read)),
             grounded::find.run_if(any_with_component::<Grounded>),

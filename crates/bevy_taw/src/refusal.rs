@@ -39,6 +39,18 @@ pub enum Refusal {
     /// An entity that would push itself: it is a marble, and no wall.
     #[error("an entity is both a Marble and a Wall; it is a marble only")]
     MarbleAndWall,
+    /// A body that is a marble, too: it is a marble, and no body.
+    #[error("an entity is both a Body and a Marble; it is a marble only")]
+    BodyAndMarble,
+    /// A body that is a wall, too: it is a wall, and no body.
+    #[error("an entity is both a Body and a Wall; it is a wall only")]
+    BodyAndWall,
+    /// A body that a marble is to [ignore](crate::ignore::IgnoreCollisions): the two collide.
+    #[error("IgnoreCollisions names {0}, which is a Body; only marbles and walls can be ignored")]
+    IgnoredBody(Entity),
+    /// An end of a [`Joint`](crate::joint::Joint), as a wall: the joint waits until that is a marble or a body.
+    #[error("an end of the Joint is on {0}, which is neither a Marble nor a Body")]
+    JointEnd(Entity),
     /// A place that nobody can tell, because an ancestor has no `Transform` or is disabled.
     #[error("an ancestor has no Transform, or is disabled, so nobody can say where this is")]
     NoPlace,

@@ -1,6 +1,6 @@
 //! Resources: the model, gravity, the world.
 
-use bevy::platform::collections::HashMap;
+use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 use taw::body::BodyId;
 use taw::joint::JointId;
@@ -79,7 +79,8 @@ pub struct Forces(pub Vec<ForceField<f32>>);
 /// change components instead: components and resources are the truth. With the next
 /// step its model, gravity, forces and walls are again what they say, entities that
 /// lost their rows have new ones, and rows that no entity stands behind are taken out
-/// and told as [`RowRemoved`](crate::snapshot::RowRemoved).
+/// and told as [`RowRemoved`](crate::snapshot::RowRemoved): marbles, walls, bodies and balls. Joints that the game
+/// puts in by itself stay until one of their ends goes.
 ///
 /// To go back in time, take a [`TawWorld::snapshot`] and [`TawWorld::restore`] it.
 #[derive(Resource, Debug, Default, Deref, DerefMut)]
@@ -97,6 +98,8 @@ pub struct TawWorld {
     pub(crate) sensed: HashMap<(SensorId, MarbleId), Entity>,
     /// Balls of swarms inside of sensors, sorted; none while nobody listens.
     pub(crate) sensed_balls: Vec<SensedBall>,
+    /// Sensors and the marbles inside of them by which a restore is not told yet.
+    pub(crate) sensed_before: Option<HashSet<(Entity, Entity)>>,
     /// Events [`SensorLeft`](crate::sensor::SensorLeft) that are not sent yet: sensor and marble.
     pub(crate) left_sensors: Vec<(Entity, Entity)>,
     /// Sensor entities whose list of marbles inside is out of date.

@@ -2,14 +2,14 @@
 
 use bevy::math::Affine3A;
 use bevy::prelude::*;
-use bevy_transform_interpolation::prelude::NoTransformEasing;
 
+use crate::body::{self, Body, MovedBody};
 use crate::components::{
-    AngularVelocity, Eased, Marble, MarbleState, Sleeping, Velocity, bits, rotation_bits,
+    AngularVelocity, Marble, MarbleState, Sleeping, Velocity, bits, rotation_bits,
 };
 use crate::convert::{from_point, from_rotation, from_vector};
 use crate::gather::{ChangedMarbles, MANY};
-use crate::placed::Placed;
+use crate::placed::{Placed, PlacedChildren};
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
 
@@ -22,6 +22,11 @@ pub(crate) struct Frame {
 
 impl Frame {
     pub const WORLD: Self = Self { of_parent: None };
+
+    /// Frame of an entity that is a parent, if it has a place and there is a way back.
+    pub fn of(parent: Entity, places: &TransformHelper) -> Option<Self> {
+        Self::new(&places.compute_global_transform(parent).ok()?)
+    }
 
     /// That of a parent, if there is a way back: not from a scale of zero.
     pub fn new(parent: &GlobalTransform) -> Option<Self> {
@@ -80,19 +85,15 @@ type Moved<'a> = (
     &'a mut MarbleState,
 );
 
-/// Writes `Transform`, `Velocity` and `AngularVelocity` of the marbles that moved, and of those
+/// Writes `Transform`, `Velocity` and `AngularVelocity` of the marbles that moved and are no children, and of those
 /// whose own values were refused. What sleeps and was not written by others is as it was.
 pub fn marbles(
     world: Res<TawWorld>,
     mut transforms: ParamSet<(
         Query<Moved, (With<Marble>, Without<ChildOf>, Without<Sleeping>)>,
-        TransformHelper,
-        Query<Moved, With<Marble>>,
+        Query<Moved, (With<Marble>, Without<ChildOf>)>,
     )>,
-    children: Query<(Entity, &ChildOf), With<Marble>>,
     changed: Res<ChangedMarbles>,
-    mut frames: Local<Vec<(Entity, Frame)>>,
-    mut refusals: Refusals,
 ) {
     let write_one = |moved: MovedItem| write(&world, moved, &Frame::WORLD);
     if transforms.p0().iter().len() < MANY {
@@ -100,64 +101,39 @@ pub fn marbles(
     } else {
         transforms.p0().par_iter_mut().for_each(write_one);
     }
-    // A child's Transform is relative to its parents, which have all moved by now.
-    let helper = transforms.p1();
-    frames.clear();
-    frames.extend(children.iter().filter_map(|(entity, child_of)| {
-        let parent = helper.compute_global_transform(child_of.parent()).ok()?;
-        let frame = Frame::new(&parent);
-        if frame.is_none() {
-            let [x, y, z] = parent.scale().to_array();
-            refusals.check(Some(entity), Err(Refusal::NoFrame(x, y, z)));
-        }
-        Some((entity, frame?))
-    }));
-    let mut marbles = transforms.p2();
+    let mut marbles = transforms.p1();
     for entity in &changed.gathered {
-        if !children.contains(*entity)
-            && let Ok(moved) = marbles.get_mut(*entity)
-        {
+        if let Ok(moved) = marbles.get_mut(*entity) {
             write(&world, moved, &Frame::WORLD);
         }
     }
-    for (entity, frame) in &frames {
-        if let Ok(moved) = marbles.get_mut(*entity) {
-            write(&world, moved, frame);
-        }
-    }
 }
 
-/// Run condition: there are marbles, or bodies, that are children.
-pub(crate) fn any_child<T: Placed>(placed: Query<(), (With<T>, With<ChildOf>)>) -> bool {
-    !placed.is_empty()
-}
-
-type NotEased = Or<(Without<Eased>, With<NoTransformEasing>)>;
-
-/// Keeps marbles, or bodies, that are children where they are while their parents move between steps, unless
-/// somebody moved them, too. Those that are eased are drawn elsewhere.
-pub(crate) fn stay<T: Placed>(
+/// Writes marbles and bodies that are children: their `Transform`s are relative to their parents, which have all moved
+/// by then.
+pub(crate) fn children(
     world: Res<TawWorld>,
-    mut transforms: ParamSet<(TransformHelper, Query<(&mut Transform, &mut T)>)>,
-    children: Query<(Entity, &ChildOf), (With<T>, NotEased)>,
-    mut frames: Local<Vec<(Entity, Frame)>>,
+    mut placed: ParamSet<(
+        Query<Moved, With<Marble>>,
+        Query<MovedBody, With<Body>>,
+        TransformHelper,
+    )>,
+    children: PlacedChildren,
+    mut refusals: Refusals,
+    mut commands: Commands,
 ) {
-    let helper = transforms.p0();
-    frames.clear();
-    frames.extend(children.iter().filter_map(|(entity, child_of)| {
-        let parent = helper.compute_global_transform(child_of.parent()).ok()?;
-        Some((entity, Frame::new(&parent)?))
-    }));
-    let mut placed = transforms.p1();
-    for (entity, frame) in &frames {
-        let Ok((mut transform, mut state)) = placed.get_mut(*entity) else { continue };
-        let Some((position, rotation)) = state.place(&world) else { continue };
-        let (translation, turned) = state.seen();
-        if bits(transform.translation) == translation {
-            put(&mut transform, &mut state, frame, Some(position), None);
+    for (child, parent) in children.in_order() {
+        let Ok(parent) = placed.p2().compute_global_transform(parent) else { continue };
+        let Some(frame) = Frame::new(&parent) else {
+            let [x, y, z] = parent.scale().to_array();
+            refusals.check(Some(child), Err(Refusal::NoFrame(x, y, z)));
+            continue;
+        };
+        if let Ok(marble) = placed.p0().get_mut(child) {
+            write(&world, marble, &frame);
         }
-        if rotation_bits(transform.rotation) == turned {
-            put(&mut transform, &mut state, frame, None, rotation);
+        if let Ok(body) = placed.p1().get_mut(child) {
+            body::write(&world, body, &frame, &mut commands);
         }
     }
 }

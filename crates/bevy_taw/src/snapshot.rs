@@ -14,6 +14,7 @@ use crate::contact_force::PairImpulse;
 use crate::contact_points::ContactKey;
 use crate::messages::{ContactPair, ContactPoint};
 use crate::resources::TawWorld;
+use crate::sensor::SensorEntered;
 
 /// The physics of an app as it was: see [`TawWorld::snapshot`].
 #[derive(Clone, Debug)]
@@ -93,9 +94,14 @@ impl TawWorld {
     /// }
     /// ```
     ///
+    /// A marble that is in a [`Sensor`](crate::sensor::Sensor) then and was not before has entered it, and one that was
+    /// and is no more has left it. Of balls of swarms, nothing is told twice.
+    ///
     /// [Controllers](crate::controller::MarbleController) drive nothing in the step after it: what they
     /// would go by is of the time before.
     pub fn restore(&mut self, snapshot: &TawSnapshot) {
+        let told = self.sensed_pairs().chain(self.left_sensors.iter().copied()).collect();
+        self.sensed_before.get_or_insert(told);
         self.world = snapshot.world.clone();
         self.marble_entities.clone_from(&snapshot.marble_entities);
         self.wall_entities.clone_from(&snapshot.wall_entities);
@@ -113,6 +119,41 @@ impl TawWorld {
         self.stale_sensors.extend(self.sensor_entities.values());
         self.restored = self.restored.wrapping_add(1);
         self.just_restored = true;
+    }
+
+    /// Sensors and the marbles inside of them.
+    fn sensed_pairs(&self) -> impl Iterator<Item = (Entity, Entity)> {
+        let sensor = |id| self.sensor_entities.get(id).copied();
+        self.sensed.iter().filter_map(move |((id, _), marble)| Some((sensor(id)?, *marble)))
+    }
+}
+
+/// Tells who is in sensors by a restore and was not before, and who is no more.
+pub(crate) fn tell_sensed(
+    mut world: ResMut<TawWorld>,
+    time: Res<Time>,
+    mut entered: MessageWriter<SensorEntered>,
+    mut commands: Commands,
+) {
+    if world.sensed_before.is_none() {
+        return;
+    }
+    let world = &mut *world;
+    let before = world.sensed_before.take().unwrap_or_default();
+    // A marble that has gone since is not told to enter, nor to leave by the event that takes it out.
+    world.sensed.retain(|(sensor, id), marble| {
+        let sensor = world.sensor_entities.get(sensor);
+        world.marble_entities.contains_key(id)
+            || sensor.is_some_and(|sensor| before.contains(&(*sensor, *marble)))
+    });
+    let now: HashSet<_> = world.sensed_pairs().collect();
+    world.left_sensors = before.difference(&now).copied().collect();
+    let mut new: Vec<_> = now.difference(&before).copied().collect();
+    new.sort_unstable(); // sets have no order
+    for (sensor, marble) in new {
+        let event = SensorEntered { sensor, marble, time_left: time.delta_secs() };
+        entered.write(event);
+        commands.trigger(event);
     }
 }
 

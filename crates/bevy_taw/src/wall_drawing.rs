@@ -10,6 +10,7 @@ use bevy::math::{Affine3A, Isometry3d};
 use bevy::prelude::*;
 use bevy_transform_interpolation::prelude::NoTransformEasing;
 
+use crate::body::Body;
 use crate::components::{Marble, WallState};
 use crate::gather_walls::FrameTime;
 
@@ -38,7 +39,7 @@ pub(crate) struct Hierarchy<'w, 's> {
     transforms: Query<'w, 's, &'static Transform>,
     parents: Query<'w, 's, &'static ChildOf>,
     children: Query<'w, 's, &'static Children>,
-    marbles: Query<'w, 's, (), With<Marble>>,
+    placed: Query<'w, 's, (), Or<(With<Marble>, With<Body>)>>,
 }
 
 type MovedWall = (With<WallState>, Changed<GlobalTransform>);
@@ -100,7 +101,7 @@ fn between(from: Isometry3d, to: Isometry3d, part: f32) -> Isometry3d {
 
 impl Drawing {
     /// Entity by which a wall moves, and its depth in the hierarchy: the nearest one that changes, or the
-    /// wall itself. None if the wall is drawn where its `Transform` is: one on a marble, and one that is
+    /// wall itself. None if the wall is drawn where its `Transform` is: one on a marble or body, and one that is
     /// moved while time stands still.
     fn carrier(
         &mut self,
@@ -112,7 +113,7 @@ impl Drawing {
         let recent = now - 2.0 * (time.delta() + fixed.timestep()).as_secs_f64();
         let (mut carrier, mut is_held, mut length) = (None, false, 0);
         for entity in std::iter::once(wall).chain(hierarchy.parents.iter_ancestors(wall)) {
-            if hierarchy.marbles.contains(entity) {
+            if hierarchy.placed.contains(entity) {
                 return None;
             }
             let transform = *hierarchy.transforms.get(entity).ok()?;
@@ -135,7 +136,7 @@ impl Drawing {
 }
 
 impl Hierarchy<'_, '_> {
-    /// Draws an entity, and what it carries except marbles, by a displacement beside where it is.
+    /// Draws an entity, and what it carries except marbles and bodies, by a displacement beside where it is.
     fn place(&self, entity: Entity, by: Affine3A, globals: &mut Query<&mut GlobalTransform>) {
         let Ok(place) = self.places.compute_global_transform(entity) else { return };
         let mut open = vec![(entity, GlobalTransform::from(by * place.affine()))];
@@ -144,7 +145,7 @@ impl Hierarchy<'_, '_> {
                 global.set_if_neq(place);
             }
             let children = self.children.get(entity).into_iter().flatten();
-            let children = children.filter(|child| !self.marbles.contains(**child));
+            let children = children.filter(|child| !self.placed.contains(**child));
             open.extend(
                 children
                     .filter_map(|child| Some((*child, place * *self.transforms.get(*child).ok()?))),
