@@ -26,7 +26,7 @@ use crate::scatter::{Frame, put};
 /// was. [`TawWorld::restore`] brings it back to where it was, too.
 ///
 /// Bodies need [`Response::SoftStep`](taw::response::Response::SoftStep), the default. They are in no message of
-/// contacts, sensor or query yet, and are no ground of [`Grounded`](crate::grounded::Grounded), from which a
+/// contacts yet, and are no ground of [`Grounded`](crate::grounded::Grounded), from which a
 /// [`MarbleController`](crate::controller::MarbleController) could jump. Force fields and zones do not act on them. On a
 /// body, `LockedAxes`, `ColliderDisabled`, `IgnoreCollisions`, `ContactForce`, `SurfaceVelocity` and `OneWay` do nothing.
 /// By default it is of glass, like marbles: a box of 40 cm has 160 kg, which motors have to move.

@@ -207,12 +207,14 @@ fn nearest(
     let row = seeker.row as usize;
     let (id, position) = (world.marbles.id(row)?, world.marbles.position()[row]);
     let reach = world.marbles.radius()[row] * 1.02;
-    let collides = |other| world.may_collide(id, other) == Ok(true);
+    let is_body = |other| matches!(other, ColliderId::Body(_)); // no ground yet
+    let collides = |other| !is_body(other) && world.may_collide(id, other) == Ok(true);
     let hit = world.queries(tree).project_point(position, reach, collides)?;
     let (entity, point) = (world.collider_entity(hit.collider)?, hit.result.point);
     let surface = match hit.collider {
         ColliderId::Wall(_) => wall_velocity(world, walls, entity, (point, hit.result.normal)),
         ColliderId::Marble(id) => from_vector(world.marbles.get(id).ok()?.velocity),
+        ColliderId::Body(_) => return None,
     };
     let found = ground(entity, hit.result.normal, point, surface);
     (seeker.level(&found) >= seeker.least).then_some(found)

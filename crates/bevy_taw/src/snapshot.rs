@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use taw::body::BodyId;
 use taw::joint::JointId;
 use taw::swarm::BallId;
-use taw::world::{MarbleId, SensorId, WallId};
+use taw::world::{ColliderId, MarbleId, SensorId, WallId};
 
 use crate::ball_sensor::SensedBall;
 use crate::components::{MarbleState, Sleeping, WallState};
@@ -27,7 +27,7 @@ pub struct TawSnapshot {
     ball_entities: Vec<Option<Entity>>,
     sensed_balls: Vec<SensedBall>,
     moving_walls: Vec<WallId>,
-    sensed: HashMap<(SensorId, MarbleId), Entity>,
+    sensed: HashMap<(SensorId, ColliderId), Entity>,
     pair_impulses: Vec<(ContactPair, PairImpulse)>,
     contact_points: Vec<(ContactKey, ContactPoint)>,
 }
