@@ -82,7 +82,7 @@ fn parts(mut commands: Commands, mut paint: Paint) {
         |lost: On<SensorEntered>,
          mut balls: Query<(&mut Transform, &mut Velocity)>,
          mut score: ResMut<Score>| {
-            if let Ok((mut place, mut velocity)) = balls.get_mut(lost.marble) {
+            if let Ok((mut place, mut velocity)) = balls.get_mut(lost.collider) {
                 (place.translation, velocity.0) = (START, Vec3::new(-0.7, 0.0, -2.0));
                 score.lost += 1;
             }

@@ -73,7 +73,7 @@ fn track(mut commands: Commands, mut paint: Paint) {
         paint.shape(Plane3d::default().mesh().size(16.0, 16.0), tailwind::EMERALD_800),
     ));
     let arrive = |entered: On<SensorEntered>, names: Query<&Name>, mut arrived: ResMut<Arrived>| {
-        let name = names.get(entered.marble).map(ToString::to_string).unwrap_or_default();
+        let name = names.get(entered.collider).map(ToString::to_string).unwrap_or_default();
         if !arrived.0.contains(&name) {
             arrived.0.push(name);
         }

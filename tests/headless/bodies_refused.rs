@@ -53,14 +53,13 @@ fn what_does_nothing_on_a_body_is_named() {
     app.update();
     assert_eq!(ignored(&app), [""; 0]);
     let idle = (LockedAxes::default(), ColliderDisabled::default(), IgnoreCollisions::default());
-    let idle = (idle, ContactForce::default(), SurfaceVelocity::default(), OneWay::default());
+    let idle = (idle, SurfaceVelocity::default(), OneWay::default());
     app.world_mut().entity_mut(body).insert(idle);
     app.update();
     let expected = [
         "LockedAxes",
         "ColliderDisabled",
         "IgnoreCollisions",
-        "ContactForce",
         "SurfaceVelocity",
         "OneWay",
     ];

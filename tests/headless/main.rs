@@ -6,6 +6,7 @@ mod blender;
 mod board;
 mod bodies;
 mod bodies_refused;
+mod body_contacts;
 mod capsules;
 mod contact_forces;
 mod contact_points;

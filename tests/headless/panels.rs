@@ -89,7 +89,7 @@ fn sensors_are_listed_with_who_is_inside() {
     app.world_mut().spawn(Swarm::new(vec![Ball::new(Vec3::Y, 0.1); 1]));
     scene::frames(&mut app, 2);
     let found = texts(&mut app, debug_ui::sensors);
-    assert_eq!(found[0], "Goal: 2 marbles, 1 balls");
+    assert_eq!(found[0], "Goal: 2 marbles and bodies, 1 balls");
     assert!(["Red, Blue", "Blue, Red"].contains(&found[1].as_str()), "{found:?}");
     assert_eq!(found.len(), 2);
 }

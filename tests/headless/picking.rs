@@ -1,4 +1,4 @@
-//! Pointers on marbles and walls, through a camera.
+//! Pointers on marbles, walls and bodies, through a camera.
 
 use bevy::asset::uuid::Uuid;
 use bevy::camera::visibility::RenderLayers;
@@ -86,6 +86,18 @@ fn a_pointer_is_over_the_nearest_marble_or_wall() {
     // It follows marbles that move.
     app.world_mut().entity_mut(beside).insert(Transform::from_xyz(3.0, 0.7, 0.0));
     assert_eq!(point_at(&mut app, 3.0, 0.7), [("over", beside)]);
+}
+
+#[test]
+fn a_pointer_is_over_a_crate() {
+    let mut app = app();
+    app.world_mut().resource_mut::<TawModel>().response = Response::SoftStep;
+    let body = app.world_mut().spawn(Body::from(Cuboid::from_length(1.0))).id();
+    frames(&mut app, 2);
+    assert_eq!(point_at(&mut app, 0.0, 0.0), [("over", body)]);
+    // Near a corner, where a ball would not be.
+    assert_eq!(point_at(&mut app, 0.48, 0.48), []);
+    assert_eq!(point_at(&mut app, 0.6, 0.0), [("out", body)]);
 }
 
 #[test]

@@ -324,3 +324,60 @@ fn picking_and_despawning_fifty_of_ten_thousand() {
     }
     println!("balls through the world: {:?} each", start.elapsed() / 50);
 }
+
+/// A box that stands on its edge, below a marble.
+#[test]
+fn a_turned_body_is_found_by_its_entity() {
+    let mut app = scene::app();
+    app.insert_resource(TawModel(Model::GAME)).insert_resource(Gravity(Vec3::ZERO));
+    let turned = Transform::from_rotation(Quat::from_rotation_z(std::f32::consts::FRAC_PI_4));
+    let layers = CollisionLayers::new(1_u32, LayerMask::ALL);
+    let body = app.world_mut().spawn((Body::from(Cuboid::from_length(2.0)), turned, layers)).id();
+    let marble = scene::drop_marble(&mut app, 0.5, Vec3::new(0.5, 5.0, 0.0));
+    app.update();
+    let edge = std::f32::consts::SQRT_2;
+    let down = ray(Vec3::new(0.5, 9.0, 0.0), Vec3::NEG_Y);
+    let hits = ask(&mut app, move |spatial| spatial.cast_ray_all(down, 20.0, &all()));
+    assert_eq!(hits.iter().map(|hit| hit.entity).collect::<Vec<_>>(), [marble, body]);
+    assert!((hits[1].distance - (9.0 - (edge - 0.5))).abs() < 1e-5, "{hits:?}");
+    assert!(hits[1].normal.distance(vec3(1.0, 1.0, 0.0).normalize()) < 1e-5, "{hits:?}");
+    let of_kind = |app: &mut App, filter: fn() -> SpatialQueryFilter<'static>| {
+        let hits = ask(app, move |spatial| spatial.cast_ray_all(down, 20.0, &filter()));
+        hits.into_iter().map(|hit| hit.entity).collect::<Vec<_>>()
+    };
+    assert_eq!(of_kind(&mut app, SpatialQueryFilter::bodies), [body]);
+    assert_eq!(of_kind(&mut app, SpatialQueryFilter::marbles), [marble]);
+    assert!(of_kind(&mut app, SpatialQueryFilter::walls).is_empty());
+    assert!(of_kind(&mut app, SpatialQueryFilter::balls).is_empty());
+    assert_eq!(of_kind(&mut app, || all().without_balls()), [marble, body]);
+    assert_eq!(of_kind(&mut app, || SpatialQueryFilter::bodies().with_mask(1_u32)), [body]);
+    assert!(of_kind(&mut app, || SpatialQueryFilter::bodies().with_mask(2_u32)).is_empty());
+    let others = ask(&mut app, move |spatial| {
+        let filter = all().with_excluded_entities([body]);
+        spatial.cast_ray_all(down, 20.0, &filter).len()
+    });
+    assert_eq!(others, 1);
+    // The sphere is beside the edge on the right, and in a corner of the bounding box.
+    let overlaps = [vec3(1.3, 0.0, 0.0), vec3(1.2, 1.2, 0.0)].map(|at| {
+        let find = move |spatial: &SpatialQuery| {
+            spatial.overlaps(&Sphere::new(0.1), Isometry3d::from_translation(at), &all()).unwrap()
+        };
+        ask(&mut app, find)
+    });
+    assert_eq!(overlaps, [vec![body], vec![]]);
+    let hit = ask(&mut app, |spatial| {
+        let from = Isometry3d::from_translation(Vec3::Y * 9.0);
+        let filter = SpatialQueryFilter::bodies();
+        spatial.cast_shape(&Sphere::new(0.5), from, Vec3::NEG_Y * 20.0, &filter).unwrap().unwrap()
+    });
+    assert_eq!(hit.entity, body);
+    assert!((20.0 * hit.fraction - (8.5 - edge)).abs() < 1e-4, "{hit:?}");
+    let near = ask(&mut app, |spatial| spatial.project_point(Vec3::X * 3.0, 9.0, &all()).unwrap());
+    assert_eq!(near.entity, body);
+    assert!((near.distance - (3.0 - edge)).abs() < 1e-5, "{near:?}");
+    let collider = ask(&mut app, move |spatial| spatial.collider(body)).unwrap();
+    assert_eq!(app.world().resource::<TawWorld>().collider_entity(collider), Some(body));
+    app.world_mut().despawn(body);
+    assert!(of_kind(&mut app, SpatialQueryFilter::bodies).is_empty());
+    assert_eq!(of_kind(&mut app, SpatialQueryFilter::default), [marble]);
+}

@@ -22,7 +22,7 @@ fn note(
     grounded: Query<&Grounded>,
 ) {
     notes.contacts.extend(contacts.read().map(|it| (it.pair, it.point)));
-    notes.sensed.extend(sensed.read().map(|it| (it.marble, it.time_left)));
+    notes.sensed.extend(sensed.read().map(|it| (it.collider, it.time_left)));
     notes.grounded.extend(grounded.iter().map(|it| it.ground.is_some()));
 }
 

@@ -20,8 +20,8 @@ fn listen(
     mut left: MessageReader<SensorLeft>,
 ) {
     // Of one step: who passed through entered first.
-    told.0.extend(entered.read().map(|it| (true, it.sensor, it.marble)));
-    told.0.extend(left.read().map(|it| (false, it.sensor, it.marble)));
+    told.0.extend(entered.read().map(|it| (true, it.sensor, it.collider)));
+    told.0.extend(left.read().map(|it| (false, it.sensor, it.collider)));
 }
 
 fn app(response: Response) -> App {
@@ -48,6 +48,11 @@ fn shoot(app: &mut App, radius: f32, at: Vec3, velocity: Vec3) -> Entity {
     marble
 }
 
+fn throw(app: &mut App, at: Vec3, velocity: Vec3) -> Entity {
+    let body = Body::from(Cuboid::from_length(0.1));
+    app.world_mut().spawn((body, Velocity(velocity), Transform::from_translation(at))).id()
+}
+
 fn inside(app: &App, sensor: Entity) -> Vec<Entity> {
     app.world().get::<CollidingEntities>(sensor).unwrap().to_vec()
 }
@@ -69,6 +74,65 @@ fn a_gate_notices_marbles_of_any_speed_and_stops_none() {
                 assert_eq!(**velocity, Vec3::X * speed, "{case}");
                 assert!(inside(&app, gate).is_empty(), "{case}");
             }
+        }
+    }
+}
+
+#[test]
+fn a_gate_notices_bodies_of_any_speed_and_stops_none() {
+    for speed in [0.5, 5.0, 100.0, 300.0_f32] {
+        let mut app = app(Response::SoftStep);
+        let gate = gate(&mut app, Vec3::new(0.002, 2.0, 2.0), Vec3::ZERO);
+        let start = -0.3 - 0.1 * speed.sqrt();
+        let body = throw(&mut app, Vec3::X * start, Vec3::X * speed);
+        scene::frames(&mut app, (64.0 * (1.0 - start) / speed) as u32 + 20);
+        assert_eq!(told(&mut app), [(true, gate, body), (false, gate, body)], "{speed} m/s");
+        let velocity = app.world().get::<Velocity>(body).unwrap();
+        assert_eq!(**velocity, Vec3::X * speed, "{speed} m/s");
+        assert!(inside(&app, gate).is_empty(), "{speed} m/s");
+    }
+}
+
+/// However a body goes, it leaves the sensor, and those beside it stay.
+#[test]
+fn a_body_that_goes_leaves_the_sensor() {
+    type Deed = fn(&mut App, Entity);
+    let deeds: [(&str, Deed); 5] = [
+        ("despawned", |app, body| {
+            app.world_mut().despawn(body);
+        }),
+        ("disabled", |app, body| {
+            app.world_mut().entity_mut(body).insert(Disabled);
+        }),
+        ("no body", |app, body| {
+            app.world_mut().entity_mut(body).remove::<Body>();
+        }),
+        ("elsewhere", |app, body| {
+            app.world_mut().get_mut::<Transform>(body).unwrap().translation = Vec3::X * 9.0;
+        }),
+        ("no layers", |app, body| {
+            app.world_mut().entity_mut(body).insert(CollisionLayers::NONE);
+        }),
+    ];
+    for (name, deed) in deeds {
+        let mut app = app(Response::SoftStep);
+        let zone = gate(&mut app, Vec3::splat(2.0), Vec3::ZERO);
+        let marble = scene::drop_marble(&mut app, 0.1, Vec3::X * -0.5);
+        let body = throw(&mut app, Vec3::X * 0.5, Vec3::ZERO);
+        app.update();
+        assert_eq!(told(&mut app), [(true, zone, marble), (true, zone, body)], "{name}");
+        let mut both = [marble, body];
+        both.sort_unstable();
+        assert_eq!(inside(&app, zone), both, "{name}");
+        deed(&mut app, body);
+        scene::frames(&mut app, 3);
+        assert_eq!(told(&mut app), [(false, zone, body)], "{name}");
+        assert_eq!(inside(&app, zone), [marble], "{name}");
+        if name == "disabled" {
+            app.world_mut().entity_mut(body).remove::<Disabled>();
+            scene::frames(&mut app, 3);
+            assert_eq!(told(&mut app), [(true, zone, body)], "enabled again");
+            assert_eq!(inside(&app, zone), both);
         }
     }
 }
@@ -163,7 +227,7 @@ fn layers_observers_and_snapshots() {
     app.world_mut()
         .entity_mut(zone)
         .insert(CollisionLayers::new(LayerMask::ALL, 1_u32))
-        .observe(|it: On<SensorEntered>, mut seen: ResMut<Seen>| seen.0.push(it.marble));
+        .observe(|it: On<SensorEntered>, mut seen: ResMut<Seen>| seen.0.push(it.collider));
     let unseen = scene::drop_marble(&mut app, 0.1, Vec3::Y * 0.4);
     app.world_mut().entity_mut(unseen).insert(CollisionLayers::new(2_u32, LayerMask::ALL));
     app.update();
@@ -240,24 +304,25 @@ fn who_is_in_a_sensor_that_goes_leaves_it() {
     for (name, deed) in deeds {
         let mut app = app(Response::SoftStep);
         let zone = gate(&mut app, Vec3::splat(2.0), Vec3::ZERO);
-        let mut marbles = [-0.5, 0.5].map(|x| scene::drop_marble(&mut app, 0.1, Vec3::X * x));
-        marbles.sort_unstable();
+        let [a, b] = [-0.5, 0.5].map(|x| scene::drop_marble(&mut app, 0.1, Vec3::X * x));
+        let mut all = [a, b, throw(&mut app, Vec3::Y * 0.5, Vec3::ZERO)];
+        all.sort_unstable();
         let sorted = |app: &mut App| {
             let mut told = told(app);
             told.sort_unstable();
             told
         };
         app.update();
-        assert_eq!(sorted(&mut app), marbles.map(|it| (true, zone, it)), "{name}");
+        assert_eq!(sorted(&mut app), all.map(|it| (true, zone, it)), "{name}");
         deed(&mut app, zone);
         scene::frames(&mut app, 3);
-        assert_eq!(sorted(&mut app), marbles.map(|it| (false, zone, it)), "{name}");
+        assert_eq!(sorted(&mut app), all.map(|it| (false, zone, it)), "{name}");
         if name == "disabled" {
             assert!(inside(&app, zone).is_empty(), "{name}");
             app.world_mut().entity_mut(zone).remove::<Disabled>();
             scene::frames(&mut app, 3);
-            assert_eq!(sorted(&mut app), marbles.map(|it| (true, zone, it)), "enabled again");
-            assert_eq!(inside(&app, zone), marbles);
+            assert_eq!(sorted(&mut app), all.map(|it| (true, zone, it)), "enabled again");
+            assert_eq!(inside(&app, zone), all);
         }
     }
 }

@@ -24,11 +24,10 @@ use crate::scatter::{Frame, put};
 /// While its entity is [`Disabled`](bevy::ecs::entity_disabling::Disabled), it is out of the world with its joints, and comes back as it
 /// was. [`TawWorld::restore`] brings it back to where it was, too.
 ///
-/// Bodies need [`Response::SoftStep`](taw::response::Response::SoftStep), the default. They are in no message of
-/// contacts, sensor or query yet, and are no ground of [`Grounded`](crate::grounded::Grounded), from which a
-/// [`MarbleController`](crate::controller::MarbleController) could jump. Force fields and zones do not act on them. On a
-/// body, `LockedAxes`, `ColliderDisabled`, `IgnoreCollisions`, `ContactForce`, `SurfaceVelocity` and `OneWay` do nothing,
-/// as [`IgnoredComponents`](crate::ignored::IgnoredComponents) says. An entity that is also a
+/// Bodies need [`Response::SoftStep`](taw::response::Response::SoftStep), the default. Messages of contacts and sensors tell of
+/// them as of marbles, except of contacts with balls of swarms, and marbles jump off them
+/// ([`Grounded`](crate::grounded::Grounded)). Force fields and zones do not act on them. On a
+/// body, `LockedAxes`, `ColliderDisabled`, `IgnoreCollisions`, `SurfaceVelocity` and `OneWay` do nothing, as [`IgnoredComponents`](crate::ignored::IgnoredComponents) says. An entity that is also a
 /// [`Marble`](crate::components::Marble) or a [`Wall`](crate::wall::Wall) is that only, and no body, and told as
 /// [`InputRefused`](crate::refusal::InputRefused). By default it is of glass, like marbles: a box of 40 cm has 160 kg, which motors have to move.
 ///

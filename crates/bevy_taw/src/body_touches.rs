@@ -1,6 +1,5 @@
 //! Contacts of bodies, told as those of marbles are.
 
-use bevy::prelude::*;
 use taw::body::ContactPartner;
 
 use crate::contact_points::ContactKey;

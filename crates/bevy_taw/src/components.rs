@@ -205,8 +205,8 @@ pub struct MarbleRotation(#[reflect(remote = RotationReflect)] pub Rotation);
 /// Marbles that rest for half a second fall asleep with those that they touch (their island; by
 /// [`SoftStep`](taw::response::Response::SoftStep), in a large heap part by part), and then cost
 /// next to nothing. They wake together when one of them is struck or written, when one beside them is
-/// written or despawned, when gravity changes, or a wall near them. Bodies do so, too, but not for a body that is placed into them; those that a joint holds or that
-/// lie on something that moves do not sleep. By
+/// written or despawned, when gravity changes, or a wall near them. Bodies do so, too, and sleep only together with the
+/// marbles and balls that they touch; those that a joint holds or that lie on something that moves do not sleep. By
 /// [`EventDriven`](taw::response::Response::EventDriven), all sleep or none.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]

@@ -230,6 +230,7 @@ fn nearest(
     let surface = match hit.collider {
         ColliderId::Wall(_) => wall_velocity(world, walls, entity, (point, hit.result.normal)),
         ColliderId::Marble(id) => from_vector(world.marbles.get(id).ok()?.velocity),
+        ColliderId::Body(id) => from_vector(world.bodies.velocity_at(id, point).ok()?),
     };
     let found = ground(entity, hit.result.normal, point, surface);
     (seeker.level(&found) >= seeker.least).then_some(found)

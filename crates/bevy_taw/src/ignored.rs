@@ -124,14 +124,13 @@ impl<'a> Carriers<'a> {
     }
 
     /// Each name of a component that has no effect on a body, and true if one has it.
-    fn of_bodies(&self) -> [(&'static str, bool); 13] {
+    fn of_bodies(&self) -> [(&'static str, bool); 12] {
         let bodies = &self.bodies;
         [
             ("LockedAxes of a body", self.any::<LockedAxes>(bodies)),
             ("ColliderDisabled of a body", self.any::<ColliderDisabled>(bodies)),
             ("IgnoreCollisions of a body", self.any::<IgnoreCollisions>(bodies)),
             ("FilterPairs of a body", self.any::<FilterPairs>(bodies)),
-            ("ContactForce of a body", self.any::<ContactForce>(bodies)),
             ("SurfaceVelocity of a body", self.any::<SurfaceVelocity>(bodies)),
             ("OneWay of a body", self.any::<OneWay>(bodies)),
             ("Sensor of a body", self.any::<Sensor>(bodies)),

@@ -46,11 +46,11 @@
 //! | [`messages`] | contacts that start, go on and end, and each contact of a pair |
 //! | [`contact_force`] | loads of marbles and walls |
 //! | [`layers`] | who collides with whom |
-//! | [`sensor`] | shapes that report which marbles and balls enter and leave |
+//! | [`sensor`] | shapes that report which marbles, bodies and balls enter and leave |
 //! | [`grounded`] | the ground under marbles |
 //! | [`controller`] | marbles that a player rolls |
 //! | [`zones`] | gravity and wind of their own in places |
-//! | [`spatial_query`] | rays, shapes and points among marbles, walls and balls of swarms |
+//! | [`spatial_query`] | rays, shapes and points among marbles, walls, bodies and balls of swarms |
 //! | [`snapshot`] | back in time, and rows without entities |
 //! | [`preview`] | paths that marbles would take, and shots |
 //! | [`ignore`] | marbles that pass through others, one-way walls |
@@ -60,7 +60,7 @@
 //! | [`diagnostics`] | step time and counts |
 //! | [`wall_motion`] | speed of walls that move |
 //! | [`interpolation`] | smooth motion between fixed steps, of marbles and of walls that move |
-//! | `picking` (feature `picking`) | pointers on marbles and walls |
+//! | `picking` (feature `picking`) | pointers on marbles, walls and bodies |
 //! | `mesh_walls` (feature `mesh`) | walls of meshes, meshes of walls |
 //! | `gizmos` (feature `render`) | contacts, normals, velocities, sensors and the grid, drawn |
 //! | `swarm_render` (feature `render`) | swarms on the screen |

@@ -28,12 +28,10 @@ type Buffer = GizmoBuffer<TawGizmos, ()>;
 pub(crate) fn sensors(world: &TawWorld, places: &Query<&GlobalTransform>, gizmos: &mut Buffer) {
     for (id, entity) in &world.sensor_entities {
         let sensors = &world.sensors;
-        let (Ok(shape), Ok(marbles), Ok(balls)) =
-            (sensors.shape(*id), sensors.inside(*id), sensors.balls_inside(*id))
-        else {
-            continue;
-        };
-        let is_empty = marbles.is_empty() && balls.is_empty();
+        let (Ok(shape), Ok(marbles)) = (sensors.shape(*id), sensors.inside(*id)) else { continue };
+        let has_bodies = sensors.bodies_inside(*id).is_ok_and(|bodies| !bodies.is_empty());
+        let has_balls = sensors.balls_inside(*id).is_ok_and(|balls| !balls.is_empty());
+        let is_empty = marbles.is_empty() && !has_bodies && !has_balls;
         let color = if is_empty { EMPTY } else { OCCUPIED };
         let place = places.get(*entity).map_or(Vec3::ZERO, GlobalTransform::translation);
         outline(shape, place, gizmos, color);

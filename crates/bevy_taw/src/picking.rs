@@ -1,4 +1,4 @@
-//! Backend for Bevy's picking: pointers hover, click and drag marbles and walls.
+//! Backend for Bevy's picking: pointers hover, click and drag marbles, walls and bodies.
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
@@ -30,7 +30,7 @@ use crate::spatial_query::{SpatialQuery, SpatialQueryFilter};
 /// Reports what is below each pointer to Bevy's picking, whose plugins the game adds (they are in
 /// `DefaultPlugins`).
 ///
-/// All marbles and walls count, where they were after the last step, drawn or not, except those with a
+/// All marbles, walls and [bodies](crate::body::Body) count, where they were after the last step, drawn or not, except those with a
 /// [`Pickable`] that is not hoverable, as `Pickable::IGNORE` of a wall that nobody sees, those in no
 /// [`RenderLayers`] of the camera, and those that the camera is in. Positions and normals
 /// of hits are those of the surface, in world space. Balls of swarms and sensors are not found:

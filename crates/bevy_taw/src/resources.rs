@@ -6,7 +6,7 @@ use taw::body::BodyId;
 use taw::joint::JointId;
 use taw::motion::ForceField;
 use taw::swarm::BallId;
-use taw::world::{Marble, MarbleId, Model, SensorId, WallId};
+use taw::world::{ColliderId, Marble, MarbleId, Model, SensorId, WallId};
 
 use crate::ball_sensor::SensedBall;
 use crate::contact_force::PairImpulse;
@@ -94,15 +94,15 @@ pub struct TawWorld {
     pub(crate) sensor_entities: HashMap<SensorId, Entity>,
     /// Entity of the swarm of each slot of balls, also of those that are gone.
     pub(crate) ball_entities: Vec<Option<Entity>>,
-    /// Marbles inside of sensors, also those that are gone.
-    pub(crate) sensed: HashMap<(SensorId, MarbleId), Entity>,
+    /// Marbles and bodies inside of sensors, also those that are gone.
+    pub(crate) sensed: HashMap<(SensorId, ColliderId), Entity>,
     /// Balls of swarms inside of sensors, sorted; none while nobody listens.
     pub(crate) sensed_balls: Vec<SensedBall>,
-    /// Sensors and the marbles inside of them by which a restore is not told yet.
+    /// Sensors and who was inside of them before a restore that is not told yet.
     pub(crate) sensed_before: Option<HashSet<(Entity, Entity)>>,
-    /// Events [`SensorLeft`](crate::sensor::SensorLeft) that are not sent yet: sensor and marble.
+    /// Events [`SensorLeft`](crate::sensor::SensorLeft) that are not sent yet: sensor and collider.
     pub(crate) left_sensors: Vec<(Entity, Entity)>,
-    /// Sensor entities whose list of marbles inside is out of date.
+    /// Sensor entities whose list of who is inside is out of date.
     pub(crate) stale_sensors: Vec<Entity>,
     /// Impulses of the contacts of the last step, sorted, one to a pair.
     pub(crate) pair_impulses: Vec<(ContactPair, PairImpulse)>,

@@ -1,4 +1,4 @@
-//! Sensors: shapes that marbles pass through, and that report which of them enter and leave.
+//! Sensors: shapes that marbles and bodies pass through, and that report which of them enter and leave.
 //!
 //! ```
 //! # use bevy::prelude::*;
@@ -21,21 +21,21 @@ use bevy::prelude::*;
 use bevy::reflect::{ReflectDeserialize, ReflectSerialize};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use taw::swarm::BallId;
-use taw::world::{MarbleId, SensorId};
+use taw::world::{ColliderId, SensorId};
 
 pub use crate::ball_sensor::{BallEntered, BallLeft};
 use crate::components::WallState;
 use crate::resources::TawWorld;
 
-/// Makes a sensor of a [`Wall`]: marbles pass through it, and it reports which of them enter and leave,
-/// by [`SensorEntered`] and [`SensorLeft`], and which are inside, by [`CollidingEntities`]; of the balls of
+/// Makes a sensor of a [`Wall`]: marbles and [bodies](crate::body::Body) pass through it, and it reports which of
+/// them enter and leave, by [`SensorEntered`] and [`SensorLeft`], and which are inside, by [`CollidingEntities`]; of the balls of
 /// swarms, which are inside after each step, by [`CollidingBalls`], [`BallEntered`] and [`BallLeft`]. Without a wall it has no shape and
 /// notices nobody, as [`IgnoredComponents`](crate::ignored::IgnoredComponents) says.
 ///
 /// It may be moved as a wall, by itself or by what carries it, and has [`CollisionLayers`]. A marble
-/// that passes through within a step enters and leaves in it, at any speed; one that is put elsewhere
+/// or body that passes through within a step enters and leaves in it, at any speed; one that is put elsewhere
 /// meets nothing on the way. Within a substep (of `SoftStep` within a step), paths are taken to be
-/// straight. Of a mesh, inside is what touches its surface.
+/// straight, in the orientation at the end. A compound is inside if one of its parts is. Of a mesh, inside is what touches its surface.
 ///
 /// [`CollisionLayers`]: crate::layers::CollisionLayers
 /// [`Wall`]: crate::wall::Wall
@@ -44,7 +44,7 @@ use crate::resources::TawWorld;
 #[require(CollidingEntities, CollidingBalls)]
 pub struct Sensor;
 
-/// Marbles inside of a sensor after the last step, sorted.
+/// Marbles and bodies inside of a sensor after the last step, sorted.
 #[derive(Component, Clone, Debug, Default, PartialEq, Eq, Deref, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct CollidingEntities(Vec<Entity>);
@@ -82,29 +82,29 @@ impl<'de> Deserialize<'de> for CollidingBalls {
     }
 }
 
-/// Message, and event of the sensor's entity: a marble entered a sensor.
+/// Message, and event of the sensor's entity: a marble or [body](crate::body::Body) entered a sensor.
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct SensorEntered {
     /// The sensor.
     #[event_target]
     pub sensor: Entity,
-    /// The marble.
-    pub marble: Entity,
+    /// The marble or body.
+    pub collider: Entity,
     /// Time from then to the end of the step, in seconds.
     pub time_left: f32,
 }
 
-/// Message, and event of the sensor's entity: a marble left a sensor, or either was despawned, disabled, or
-/// lost its component.
+/// Message, and event of the sensor's entity: a marble or [body](crate::body::Body) left a sensor, or either was
+/// despawned, disabled, or lost its component.
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct SensorLeft {
     /// The sensor, which may be gone.
     #[event_target]
     pub sensor: Entity,
-    /// The marble, which may be gone.
-    pub marble: Entity,
+    /// The marble or body, which may be gone.
+    pub collider: Entity,
     /// Time from then to the end of the step, in seconds.
     pub time_left: f32,
 }
@@ -131,7 +131,7 @@ impl TawWorld {
         if self.sensor_entities.get(&id) == Some(&entity) {
             self.sensor_entities.remove(&id);
             let left = self.sensed.extract_if(|(sensor, _), _| *sensor == id);
-            self.left_sensors.extend(left.map(|(_, marble)| (entity, marble)));
+            self.left_sensors.extend(left.map(|(_, collider)| (entity, collider)));
             self.stale_sensors.push(entity);
             let _ = self.world.sensors.remove(id); // a restored world may not have it
         }
@@ -153,24 +153,24 @@ pub(crate) fn scatter(
     }
     let world = &mut *world;
     world.left_sensors.sort_unstable(); // maps have no order
-    for (sensor, marble) in world.left_sensors.drain(..) {
-        let event = SensorLeft { sensor, marble, time_left: time.delta_secs() };
+    for (sensor, collider) in world.left_sensors.drain(..) {
+        let event = SensorLeft { sensor, collider, time_left: time.delta_secs() };
         left.write(event);
         commands.trigger(event);
     }
     for event in world.world.sensors.events() {
         let time_left = event.time_left;
         let Some(sensor) = world.sensor_entities.get(&event.sensor).copied() else { continue };
-        let key = (event.sensor, event.marble);
+        let key = (event.sensor, event.collider);
         world.stale_sensors.push(sensor);
         if event.entered {
-            let Some(marble) = world.marble_entities.get(&event.marble).copied() else { continue };
-            world.sensed.insert(key, marble);
-            let event = SensorEntered { sensor, marble, time_left };
+            let Some(collider) = world.collider_entity(event.collider) else { continue };
+            world.sensed.insert(key, collider);
+            let event = SensorEntered { sensor, collider, time_left };
             entered.write(event);
             commands.trigger(event);
-        } else if let Some(marble) = world.sensed.remove(&key) {
-            let event = SensorLeft { sensor, marble, time_left };
+        } else if let Some(collider) = world.sensed.remove(&key) {
+            let event = SensorLeft { sensor, collider, time_left };
             left.write(event);
             commands.trigger(event);
         }
@@ -180,10 +180,13 @@ pub(crate) fn scatter(
     for entity in world.stale_sensors.drain(..) {
         let Ok((mut colliding, mut balls)) = colliding.get_mut(entity) else { continue };
         let id = states.get(entity).ok().and_then(|state| state.sensor);
-        let inside = id.and_then(|id| world.world.sensors.inside(id).ok()).unwrap_or_default();
-        let of_sensor = |marble: &MarbleId| world.sensed.get(&(id?, *marble));
+        let sensors = &world.world.sensors;
+        let marbles = id.and_then(|id| sensors.inside(id).ok()).unwrap_or_default();
+        let bodies = id.and_then(|id| sensors.bodies_inside(id).ok()).unwrap_or_default();
+        let marbles = marbles.iter().map(|id| ColliderId::Marble(*id));
+        let inside = marbles.chain(bodies.iter().map(|id| ColliderId::Body(*id)));
         colliding.0.clear();
-        colliding.0.extend(inside.iter().filter_map(of_sensor));
+        colliding.0.extend(inside.filter_map(|collider| world.sensed.get(&(id?, collider))));
         colliding.0.sort_unstable();
         if id.is_none() {
             balls.0.clear();

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use taw::body::BodyId;
 use taw::joint::JointId;
 use taw::swarm::BallId;
-use taw::world::{MarbleId, SensorId, WallId};
+use taw::world::{ColliderId, MarbleId, SensorId, WallId};
 
 use crate::ball_sensor::SensedBall;
 use crate::components::{MarbleState, Sleeping, WallState};
@@ -28,7 +28,7 @@ pub struct TawSnapshot {
     ball_entities: Vec<Option<Entity>>,
     sensed_balls: Vec<SensedBall>,
     moving_walls: Vec<WallId>,
-    sensed: HashMap<(SensorId, MarbleId), Entity>,
+    sensed: HashMap<(SensorId, ColliderId), Entity>,
     pair_impulses: Vec<(ContactPair, PairImpulse)>,
     contact_points: Vec<(ContactKey, ContactPoint)>,
 }
@@ -140,18 +140,22 @@ pub(crate) fn tell_sensed(
     }
     let world = &mut *world;
     let before = world.sensed_before.take().unwrap_or_default();
-    // A marble that has gone since is not told to enter, nor to leave by the event that takes it out.
-    world.sensed.retain(|(sensor, id), marble| {
+    // Who has gone since is not told to enter, nor to leave by the event that takes it out.
+    let is_here = |id: ColliderId| match id {
+        ColliderId::Marble(id) => world.marble_entities.contains_key(&id),
+        ColliderId::Body(id) => world.body_entities.contains_key(&id),
+        ColliderId::Wall(_) => false, // senses nobody
+    };
+    world.sensed.retain(|(sensor, id), collider| {
         let sensor = world.sensor_entities.get(sensor);
-        world.marble_entities.contains_key(id)
-            || sensor.is_some_and(|sensor| before.contains(&(*sensor, *marble)))
+        is_here(*id) || sensor.is_some_and(|sensor| before.contains(&(*sensor, *collider)))
     });
     let now: HashSet<_> = world.sensed_pairs().collect();
     world.left_sensors = before.difference(&now).copied().collect();
     let mut new: Vec<_> = now.difference(&before).copied().collect();
     new.sort_unstable(); // sets have no order
-    for (sensor, marble) in new {
-        let event = SensorEntered { sensor, marble, time_left: time.delta_secs() };
+    for (sensor, collider) in new {
+        let event = SensorEntered { sensor, collider, time_left: time.delta_secs() };
         entered.write(event);
         commands.trigger(event);
     }

@@ -1,4 +1,4 @@
-//! Rays, shapes and points among marbles, walls and balls of swarms, in Bevy's types and entities.
+//! Rays, shapes and points among marbles, walls, bodies and balls of swarms, in Bevy's types and entities.
 //!
 //! Positions are those after the last fixed step, up to a step ahead of what
 //! [`TawInterpolationPlugin`](crate::interpolation::TawInterpolationPlugin) draws. For a ball of a swarm, the
@@ -36,6 +36,7 @@ use taw::shape as core;
 use taw::swarm::{BallId, BallQueries, BallQueryHit, BallTree};
 use taw::world::{ColliderId, Queries, QueryHit, QueryTree};
 
+use crate::body::BodyState;
 use crate::components::{MarbleState, WallState};
 use crate::convert::{from_point, from_vector, to_point, to_rotation, to_vector};
 use crate::layers::LayerMask;
@@ -49,6 +50,7 @@ pub struct SpatialQuery<'w, 's> {
     tree: Res<'w, SpatialTree>,
     marbles: Query<'w, 's, &'static MarbleState>,
     walls: Query<'w, 's, &'static WallState>,
+    bodies: Query<'w, 's, &'static BodyState>,
 }
 
 /// Query trees of the world and of the swarm.
@@ -77,8 +79,8 @@ impl<T: Clone> FittedTree<T> {
     }
 }
 
-/// Colliders that a query looks at: by default all marbles, walls and balls of swarms. An excluded entity
-/// may be a swarm's, and a predicate is asked about it, too.
+/// Colliders that a query looks at: by default all marbles, walls, [bodies](crate::body::Body) and balls of
+/// swarms. An excluded entity may be a swarm's, and a predicate is asked about it, too.
 #[derive(Clone, Default)]
 pub struct SpatialQueryFilter<'a> {
     mask: Option<LayerMask>,
@@ -87,21 +89,30 @@ pub struct SpatialQueryFilter<'a> {
     predicate: Option<&'a dyn Fn(Entity) -> bool>,
 }
 
-/// Kinds of colliders.
+/// Kinds of colliders, a bit each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Kinds {
-    marbles: bool,
-    walls: bool,
-    balls: bool,
-}
+struct Kinds(u8);
 
 impl Kinds {
-    const NONE: Self = Self { marbles: false, walls: false, balls: false };
+    const MARBLES: Self = Self(1);
+    const WALLS: Self = Self(2);
+    const BODIES: Self = Self(4);
+    const BALLS: Self = Self(8);
+    /// All that are in the tree of colliders.
+    const COLLIDERS: Self = Self(1 | 2 | 4);
+
+    fn has_any(self, of: Self) -> bool {
+        self.0 & of.0 != 0
+    }
+
+    fn without(self, these: Self) -> Self {
+        Self(self.0 & !these.0)
+    }
 }
 
 impl Default for Kinds {
     fn default() -> Self {
-        Self { marbles: true, walls: true, balls: true }
+        Self(Self::COLLIDERS.0 | Self::BALLS.0)
     }
 }
 
@@ -120,26 +131,32 @@ impl<'a> SpatialQueryFilter<'a> {
     /// Marbles only.
     #[must_use]
     pub fn marbles() -> Self {
-        Self { kinds: Kinds { marbles: true, ..Kinds::NONE }, ..Self::default() }
+        Self { kinds: Kinds::MARBLES, ..Self::default() }
     }
 
     /// Walls only.
     #[must_use]
     pub fn walls() -> Self {
-        Self { kinds: Kinds { walls: true, ..Kinds::NONE }, ..Self::default() }
+        Self { kinds: Kinds::WALLS, ..Self::default() }
+    }
+
+    /// [Bodies](crate::body::Body) only.
+    #[must_use]
+    pub fn bodies() -> Self {
+        Self { kinds: Kinds::BODIES, ..Self::default() }
     }
 
     /// Balls of swarms only.
     #[must_use]
     pub fn balls() -> Self {
-        Self { kinds: Kinds { balls: true, ..Kinds::NONE }, ..Self::default() }
+        Self { kinds: Kinds::BALLS, ..Self::default() }
     }
 
     /// Leaves out the balls of swarms. The first question that does not fits a tree to them after each
     /// step, which takes some nanoseconds for each.
     #[must_use]
     pub fn without_balls(self) -> Self {
-        Self { kinds: Kinds { balls: false, ..self.kinds }, ..self }
+        Self { kinds: self.kinds.without(Kinds::BALLS), ..self }
     }
 
     /// Restricts to those in one of these layers: a [`PhysicsLayer`](crate::layers::PhysicsLayer), an
@@ -163,11 +180,12 @@ impl<'a> SpatialQueryFilter<'a> {
     }
 
     fn admits(&self, world: &TawWorld, collider: ColliderId) -> bool {
-        let right_kind = match collider {
-            ColliderId::Marble(_) => self.kinds.marbles,
-            ColliderId::Wall(_) => self.kinds.walls,
+        let kind = match collider {
+            ColliderId::Marble(_) => Kinds::MARBLES,
+            ColliderId::Wall(_) => Kinds::WALLS,
+            ColliderId::Body(_) => Kinds::BODIES,
         };
-        right_kind
+        self.kinds.has_any(kind)
             && self.admits_layers(|| world.layers(collider))
             && self.admits_entity(world.collider_entity(collider))
     }
@@ -190,7 +208,7 @@ impl<'a> SpatialQueryFilter<'a> {
 /// Hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
-    /// The marble, wall or swarm.
+    /// The marble, wall, body or swarm.
     pub entity: Entity,
     /// Which ball it is, if it is one of a swarm.
     pub ball: Option<BallId>,
@@ -212,7 +230,7 @@ impl RayHit {
 /// Hit of a moving shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShapeHit {
-    /// The marble, wall or swarm.
+    /// The marble, wall, body or swarm.
     pub entity: Entity,
     /// Which ball it is, if it is one of a swarm.
     pub ball: Option<BallId>,
@@ -234,7 +252,7 @@ impl ShapeHit {
 /// Point on the surface nearest to another point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProjectedPoint {
-    /// The marble, wall or swarm.
+    /// The marble, wall, body or swarm.
     pub entity: Entity,
     /// Which ball it is, if it is one of a swarm.
     pub ball: Option<BallId>,
@@ -296,8 +314,8 @@ impl SpatialQuery<'_, '_> {
         self.cast_ray_all(ray, max_distance, filter).into_iter().next()
     }
 
-    /// First hit of a ray on each marble, wall and ball of a swarm within a distance in metres, nearest
-    /// first.
+    /// First hit of a ray on each marble, wall, body and ball of a swarm within a distance in metres,
+    /// nearest first.
     #[must_use]
     pub fn cast_ray_all(
         &self,
@@ -350,8 +368,8 @@ impl SpatialQuery<'_, '_> {
         Ok(first(hit, ball, |it| it.fraction))
     }
 
-    /// All marbles, walls and swarms that overlap a shape: a swarm if one of its balls does, once. Which
-    /// of them, [`overlapping_balls`](Self::overlapping_balls) says.
+    /// All marbles, walls, bodies and swarms that overlap a shape: a swarm if one of its balls does, once.
+    /// Which of them, [`overlapping_balls`](Self::overlapping_balls) says.
     ///
     /// # Errors
     /// A size or a place out of range.
@@ -413,23 +431,23 @@ impl SpatialQuery<'_, '_> {
         first(hit, ball, |it| it.distance)
     }
 
-    /// Collider of a marble or wall in the [`TawWorld`], once a step has gathered it.
+    /// Collider of a marble, wall or body in the [`TawWorld`], once a step has gathered it.
     #[must_use]
     pub fn collider(&self, entity: Entity) -> Option<ColliderId> {
         let marble = || Some(ColliderId::Marble(self.marbles.get(entity).ok()?.id?));
         let wall = || Some(ColliderId::Wall(self.walls.get(entity).ok()?.id?));
-        marble().or_else(wall)
+        let body = || Some(ColliderId::Body(self.bodies.get(entity).ok()?.id?));
+        marble().or_else(wall).or_else(body)
     }
 
-    /// Runs a query of marbles and walls on a tree that is up to date, if the filter has any. It may run
+    /// Runs a query of marbles, walls and bodies on a tree that is up to date, if the filter has any. It may run
     /// others.
     fn ask<R>(
         &self,
         filter: &SpatialQueryFilter,
         question: impl FnOnce(&Queries<f32>) -> R,
     ) -> Option<R> {
-        let Kinds { marbles, walls, .. } = filter.kinds;
-        if !marbles && !walls {
+        if !filter.kinds.has_any(Kinds::COLLIDERS) {
             return None;
         }
         let now = self.world.last_changed();
@@ -443,7 +461,7 @@ impl SpatialQuery<'_, '_> {
         filter: &SpatialQueryFilter,
         question: impl FnOnce(&BallQueries<f32>) -> R,
     ) -> Option<R> {
-        if !filter.kinds.balls || self.world.swarm.is_empty() {
+        if !filter.kinds.has_any(Kinds::BALLS) || self.world.swarm.is_empty() {
             return None;
         }
         let now = self.world.last_changed();
@@ -461,12 +479,13 @@ fn first<T>(a: Option<T>, b: Option<T>, key: impl Fn(&T) -> f32) -> Option<T> {
 }
 
 impl TawWorld {
-    /// The entity of a marble or wall, if there is one.
+    /// The entity of a marble, wall or body, if there is one.
     #[must_use]
     pub fn collider_entity(&self, collider: ColliderId) -> Option<Entity> {
         match collider {
             ColliderId::Marble(id) => self.marble_entities.get(&id).copied(),
             ColliderId::Wall(id) => self.wall_entities.get(&id).copied(),
+            ColliderId::Body(id) => self.body_entities.get(&id).copied(),
         }
     }
 }

@@ -19,7 +19,7 @@ use crate::sensor::{CollidingBalls, CollidingEntities, Sensor};
 use crate::swarm::Swarm;
 use crate::wall::Wall;
 
-/// Most groups, and most marbles of a sensor, that are listed; of the others, the number is.
+/// Most groups, and most marbles and bodies of a sensor, that are listed; of the others, the number is.
 const MOST: usize = 12;
 
 /// World and components that the panels [`layers`], [`sensors`] and [`collider`] read.
@@ -112,13 +112,13 @@ pub fn sensors(ui: &mut Ui, inspected: &Inspected) {
     if all.is_empty() {
         ui.weak("No sensors");
     }
-    for (sensor, marbles, balls) in all {
-        let (marble_count, ball_count) = (marbles.len(), balls.len());
+    for (sensor, inside, balls) in all {
+        let (count, ball_count) = (inside.len(), balls.len());
         let name = inspected.name(sensor);
-        ui.label(format!("{name}: {marble_count} marbles, {ball_count} balls"));
-        if !marbles.is_empty() {
-            let listed = marbles.iter().take(MOST).map(|marble| inspected.name(*marble));
-            let rest = marble_count.saturating_sub(MOST);
+        ui.label(format!("{name}: {count} marbles and bodies, {ball_count} balls"));
+        if !inside.is_empty() {
+            let listed = inside.iter().take(MOST).map(|entity| inspected.name(*entity));
+            let rest = count.saturating_sub(MOST);
             let more = (rest > 0).then(|| format!("and {rest} more"));
             ui.weak(listed.chain(more).collect::<Vec<_>>().join(", "));
         }

@@ -12,7 +12,7 @@ impl<S: Scalar> Marbles<S> {
     /// if one of the two names the other. Handles that are not there, or not yet, do no harm. An empty
     /// list is the default.
     ///
-    /// Balls of the [swarm](World::swarm), sensors and queries do not go by it. The steps look at all
+    /// Rigid bodies, balls of the [swarm](World::swarm), sensors and queries do not go by it. The steps look at all
     /// pairs that are named.
     ///
     /// # Errors
@@ -60,24 +60,23 @@ impl<S: Scalar> Marbles<S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// Returns true if a marble collides with another marble or a wall where they meet: their layers
+    /// Returns true if a marble collides with another marble, a wall or a body where they meet: their layers
     /// interact, none of the two [names the other](Marbles::set_ignored), no joint keeps them apart, and it is no
     /// [one-way wall](super::Walls::set_one_way) that let the marble pass in the last substep. A marble
     /// does not collide with itself.
     ///
     /// # Errors
-    /// [`Error::NoSuchMarble`], [`Error::NoSuchWall`].
+    /// [`Error::NoSuchMarble`], [`Error::NoSuchWall`], [`Error::NoSuchBody`].
     pub fn may_collide(&self, marble: MarbleId, other: ColliderId) -> Result<bool, Error> {
         let own = ColliderId::Marble(marble);
         let interact = self.layers(own)?.interacts_with(self.layers(other)?);
         let names = |id, other| self.marbles.ignored(id).is_ok_and(|them| them.contains(&other));
         let passes = match other {
-            ColliderId::Marble(id) => {
-                id == marble || names(id, own) || self.joints.ignores(marble, other)
-            }
-            ColliderId::Wall(wall) => self.lets_pass(wall, marble),
+            ColliderId::Marble(id) => id == marble || names(id, own) || names(marble, other),
+            ColliderId::Wall(wall) => self.lets_pass(wall, marble) || names(marble, other),
+            ColliderId::Body(_) => false,
         };
-        Ok(interact && !passes && !names(marble, other))
+        Ok(interact && !passes && !self.joints.ignores(marble, other))
     }
 
     /// Finds the rows of the pairs that pass through each other: those that are named, and those of
@@ -98,6 +97,7 @@ impl<S: Scalar> World<S> {
                 let (pairs, other) = match *other {
                     ColliderId::Marble(other) => (&mut of_marbles, self.marbles.row(other)),
                     ColliderId::Wall(wall) => (&mut of_walls, self.walls.row(wall)),
+                    ColliderId::Body(_) => continue,
                 };
                 pairs.extend(other.map(|other| [row as u32, other as u32]));
             }

@@ -235,8 +235,16 @@ impl<S: Scalar> Joints<S> {
 
     /// Returns true if a joint keeps a marble from colliding with something.
     pub(super) fn ignores(&self, marble: MarbleId, other: ColliderId) -> bool {
-        let ColliderId::Marble(other) = other else { return false };
-        self.ignored_pairs().any(|pair| pair == [marble, other] || pair == [other, marble])
+        match other {
+            ColliderId::Marble(other) => {
+                self.ignored_pairs().any(|pair| pair == [marble, other] || pair == [other, marble])
+            }
+            ColliderId::Body(body) => {
+                let pair = [JointHeld::Marble(marble), JointHeld::Body(body)];
+                self.ignored_bodies().contains(&pair)
+            }
+            ColliderId::Wall(_) => false,
+        }
     }
 }
 

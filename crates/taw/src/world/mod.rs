@@ -4,6 +4,7 @@ mod bodies;
 mod body_contact_info;
 mod body_contacts;
 mod body_seams;
+mod body_shapes;
 mod changed_rows;
 mod contact_impulses;
 mod contact_limit;
@@ -37,6 +38,7 @@ mod quarantine;
 mod query;
 mod query_walls;
 mod scratch;
+mod sensed_paths;
 mod sensors;
 mod settings;
 mod sleep;
@@ -105,7 +107,7 @@ pub struct World<S: Scalar> {
     pub joints: Joints<S>,
     /// Rigid bodies.
     pub bodies: Bodies<S>,
-    /// Sensors: shapes that tell which marbles enter and leave.
+    /// Sensors: shapes that tell which marbles and bodies enter and leave.
     pub sensors: Sensors<S>,
     /// Contacts of the last substep, except those of marbles [asleep](Self::is_asleep) with each
     /// other and with walls. Between [`World::generate_contacts`] and [`World::restitute`] they may

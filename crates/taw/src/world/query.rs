@@ -7,6 +7,7 @@ use super::query_walls::{
 use super::walls::SubShape;
 use super::{MarbleId, WallId, WallShape, World};
 use crate::Error;
+use crate::body::BodyId;
 use crate::broad::CollisionLayers;
 use crate::contact::{
     RayCast, RayHit, ShapeCastHit, closest_points_of_shapes, shape_cast_of_shapes,
@@ -15,13 +16,33 @@ use crate::frame::Ray;
 use crate::math::{Point3, Scalar, Vec3, is_finite, is_finite_point, length};
 use crate::shape::{Aabb, Aabb3, BoundedShape, Bvh, Plane, PointProjection, Shape};
 
-/// A collider: a marble or a wall.
+/// A collider: a marble, a wall or a rigid body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ColliderId {
     /// A marble.
     Marble(MarbleId),
     /// A wall.
     Wall(WallId),
+    /// A rigid body.
+    Body(BodyId),
+}
+
+impl From<MarbleId> for ColliderId {
+    fn from(id: MarbleId) -> Self {
+        Self::Marble(id)
+    }
+}
+
+impl From<WallId> for ColliderId {
+    fn from(id: WallId) -> Self {
+        Self::Wall(id)
+    }
+}
+
+impl From<BodyId> for ColliderId {
+    fn from(id: BodyId) -> Self {
+        Self::Body(id)
+    }
 }
 
 /// Hit of a query.
@@ -47,6 +68,8 @@ pub struct QueryTree<S> {
 enum Item {
     Marble(MarbleId),
     Wall(SubShape),
+    /// Convex part of a body.
+    Body(BodyId, u32),
 }
 
 impl<S: Scalar> QueryTree<S> {
@@ -66,6 +89,12 @@ impl<S: Scalar> QueryTree<S> {
                 self.boxes.push(bounds);
             });
         }
+        for (id, state) in world.bodies.ids().zip(&world.bodies.states) {
+            for (part, shape) in (0..).zip(state.world_parts()) {
+                self.items.push(Item::Body(id, part));
+                self.boxes.push(shape.bounding_box());
+            }
+        }
         if self.items == before {
             self.tree.refit(&self.boxes);
         } else {
@@ -77,7 +106,8 @@ impl<S: Scalar> QueryTree<S> {
 /// Spatial queries of the current state, created by [`World::queries`] or [`World::queries_of`]. Every
 /// query takes a filter that selects colliders; `|_| true` selects all.
 ///
-/// Rays and shapes hit meshes on their surface, from either side.
+/// Rays and shapes hit meshes on their surface, from either side. All convex parts of a wall or a body count,
+/// and each collider is found once.
 #[derive(Debug)]
 pub struct Queries<'a, S: Scalar> {
     world: &'a World<S>,
@@ -111,13 +141,16 @@ impl<S: Scalar> World<S> {
     /// Layers of a collider.
     ///
     /// # Errors
-    /// [`Error::NoSuchMarble`], [`Error::NoSuchWall`].
+    /// [`Error::NoSuchMarble`], [`Error::NoSuchWall`], [`Error::NoSuchBody`].
     pub fn layers(&self, collider: ColliderId) -> Result<CollisionLayers, Error> {
         match collider {
             ColliderId::Marble(id) => {
                 self.marbles.row(id).map(|row| self.marbles.layers_of_row(row))
             }
             ColliderId::Wall(id) => self.walls.layers(id),
+            ColliderId::Body(id) => {
+                self.bodies.row(id).map(|row| self.bodies.states[row].body.layers)
+            }
         }
     }
 
@@ -135,6 +168,19 @@ impl<S: Scalar> Queries<'_, S> {
         match item {
             Item::Marble(id) => self.world.marbles.row(id).ok().map(|_| ColliderId::Marble(id)),
             Item::Wall(part) => self.world.walls.id(part.wall as usize).map(ColliderId::Wall),
+            Item::Body(id, _) => self.world.bodies.row(id).ok().map(|_| ColliderId::Body(id)),
+        }
+    }
+
+    /// Shape of a marble, or of a part of a body.
+    fn shape(&self, item: Item) -> Option<Shape<S>> {
+        let world = self.world;
+        match item {
+            Item::Marble(id) => world.marbles.shape(id).ok(),
+            Item::Body(id, part) => {
+                world.bodies.states[world.bodies.row(id).ok()?].world_part(part)
+            }
+            Item::Wall(_) => None,
         }
     }
 
@@ -175,7 +221,7 @@ impl<S: Scalar> Queries<'_, S> {
         self.tree.tree.for_each_on_segment(ray.origin, motion, |number| {
             let item = self.tree.items[number as usize];
             hits.add(item, || match item {
-                Item::Marble(id) => self.world.marbles.shape(id).ok()?.cast_ray(ray, max_distance),
+                Item::Marble(_) | Item::Body(..) => self.shape(item)?.cast_ray(ray, max_distance),
                 Item::Wall(part) => cast_ray_on_wall(
                     &self.world.walls.shapes()[part.wall as usize],
                     part,
@@ -219,12 +265,10 @@ impl<S: Scalar> Queries<'_, S> {
         self.tree.tree.for_each_in_box(&start.union(&end), |number| {
             let item = self.tree.items[number as usize];
             match item {
-                Item::Marble(id) => {
-                    let Ok(marble) = self.world.marbles.shape(id) else { return };
-                    offer(item, &|| {
-                        Some(shape_cast_of_shapes(&marble, still, shape, translation)?.result)
-                    });
-                }
+                Item::Marble(_) | Item::Body(..) => offer(item, &|| {
+                    let other = self.shape(item)?;
+                    Some(shape_cast_of_shapes(&other, still, shape, translation)?.result)
+                }),
                 Item::Wall(SubShape { wall, index: part }) => {
                     let Some(wall) = self.world.walls.shapes().get(wall as usize) else { return };
                     offer(item, &|| cast_shape_on_wall(wall, part, shape, translation));
@@ -251,9 +295,8 @@ impl<S: Scalar> Queries<'_, S> {
         self.tree.tree.for_each_in_box(&shape.bounding_box(), |number| {
             let item = self.tree.items[number as usize];
             match item {
-                Item::Marble(id) => {
-                    let Ok(marble) = self.world.marbles.shape(id) else { return };
-                    let near = || closest_points_of_shapes(&marble, shape);
+                Item::Marble(_) | Item::Body(..) => {
+                    let near = || closest_points_of_shapes(&self.shape(item)?, shape);
                     offer(item, &|| near().is_some_and(|near| near.result.touching()));
                 }
                 Item::Wall(SubShape { wall, index: number }) => {
@@ -299,7 +342,7 @@ impl<S: Scalar> Queries<'_, S> {
         self.tree.tree.for_each_near(point, within, |number| {
             let item = self.tree.items[number as usize];
             offer(item, &|| match item {
-                Item::Marble(id) => Some(self.world.marbles.shape(id).ok()?.project_point(point)),
+                Item::Marble(_) | Item::Body(..) => Some(self.shape(item)?.project_point(point)),
                 Item::Wall(SubShape { wall, index: part }) => match walls.get(wall as usize)? {
                     solid @ WallShape::Solid(_) => Some(solid.project_point_on(part, point)),
                     other => Some(other.project_point(point)),

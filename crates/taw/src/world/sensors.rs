@@ -1,37 +1,37 @@
-//! Sensors: shapes that marbles pass through, and that report which of them enter and leave.
+//! Sensors: shapes that marbles and bodies pass through, and that report which of them enter and leave.
 
-use cgmath::{One, Zero};
-
-use super::{MarbleId, Marbles, WallShape, World};
+use super::sensed_paths::{StartCenters, sense};
+use super::{ColliderId, MarbleId, Marbles, WallShape, World};
 use crate::Error;
+use crate::body::{Bodies, BodyId};
 use crate::broad::CollisionLayers;
-use crate::frame::Pose;
 use crate::handle::Handles;
 pub use crate::handle::SensorId;
-use crate::math::{Point3, Quat, Scalar, Vec3};
+use crate::math::{Point3, Scalar};
 use crate::motion::WallMotion;
 use crate::shape::{Aabb3, Shape, Sphere};
 use crate::swarm::BallId;
 
-/// Marble that entered or left a sensor in a step.
+/// Marble or body that entered or left a sensor in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorEvent<S> {
     /// The sensor.
     pub sensor: SensorId,
-    /// The marble; one that left may have been removed.
-    pub marble: MarbleId,
+    /// The marble or body; one that left may have been removed.
+    pub collider: ColliderId,
     /// True if it entered, false if it left.
     pub entered: bool,
     /// Time from then to the end of the step, in seconds.
     pub time_left: S,
 }
 
-/// Sensors of a world. Marbles do not feel them.
+/// Sensors of a world. Marbles and bodies do not feel them.
 ///
-/// A marble is inside of a sensor if their shapes overlap; of a mesh, that is its surface. One that
+/// A marble or body is inside of a sensor if their shapes overlap; of a mesh, that is its surface. One that
 /// passes through within a substep enters and leaves in it, at any speed: its path is taken to be
-/// straight within a substep (of [`SoftStep`](crate::response::Response::SoftStep), within a step),
-/// relative to a sensor that moves. Balls of the swarm are looked for at the end of each step only.
+/// straight within a substep (of [`SoftStep`](crate::response::Response::SoftStep), within a step), in its
+/// orientation at the end, and relative to a sensor that moves. Sleepers and kinematic bodies count. Balls of the
+/// swarm are looked for at the end of each step only.
 ///
 /// ```
 /// use taw::prelude::*;
@@ -52,21 +52,28 @@ pub struct Sensors<S> {
     handles: Handles,
     rows: Vec<Sensor<S>>,
     events: Vec<SensorEvent<S>>,
-    /// Positions of the marbles at the beginning of the substep, by index, and their number of
-    /// removals then.
-    start: Vec<Point3<S>>,
-    removals: u64,
+    /// Where marbles and bodies were at the beginning of the substep.
+    marble_start: StartCenters<S>,
+    body_start: StartCenters<S>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 struct Sensor<S> {
-    shape: WallShape<S>,
-    motion: Option<WallMotion<S>>,
-    layers: CollisionLayers,
+    space: SensorSpace<S>,
     /// Marbles inside, sorted.
-    inside: Vec<MarbleId>,
+    marbles: Vec<MarbleId>,
+    /// Bodies inside, sorted.
+    bodies: Vec<BodyId>,
     /// Balls of the swarm inside, sorted.
     balls: Vec<BallId>,
+}
+
+/// Where a sensor is, and whom it senses.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct SensorSpace<S> {
+    pub shape: WallShape<S>,
+    pub motion: Option<WallMotion<S>>,
+    pub layers: CollisionLayers,
 }
 
 impl<S: Scalar> Sensors<S> {
@@ -77,14 +84,9 @@ impl<S: Scalar> Sensors<S> {
     pub fn insert(&mut self, shape: impl Into<WallShape<S>>) -> Result<SensorId, Error> {
         let shape = shape.into().validated()?;
         let id = SensorId(self.handles.push()?);
-        let layers = CollisionLayers::ALL;
-        self.rows.push(Sensor {
-            shape,
-            motion: None,
-            layers,
-            inside: Vec::new(),
-            balls: Vec::new(),
-        });
+        let space = SensorSpace { shape, motion: None, layers: CollisionLayers::ALL };
+        let (marbles, bodies, balls) = (Vec::new(), Vec::new(), Vec::new());
+        self.rows.push(Sensor { space, marbles, bodies, balls });
         Ok(id)
     }
 
@@ -105,7 +107,7 @@ impl<S: Scalar> Sensors<S> {
     /// [`Error::NoSuchSensor`], and as [`Sensors::insert`]; then nothing has changed.
     pub fn set(&mut self, id: SensorId, shape: impl Into<WallShape<S>>) -> Result<(), Error> {
         let row = self.row(id)?;
-        self.rows[row].shape = shape.into().validated()?;
+        self.rows[row].space.shape = shape.into().validated()?;
         Ok(())
     }
 
@@ -116,17 +118,17 @@ impl<S: Scalar> Sensors<S> {
     /// [`Error::NoSuchSensor`]; [`Error::NotFinite`] for a field of the motion.
     pub fn set_motion(&mut self, id: SensorId, motion: Option<WallMotion<S>>) -> Result<(), Error> {
         let row = self.row(id)?;
-        self.rows[row].motion = motion.map(WallMotion::validated).transpose()?;
+        self.rows[row].space.motion = motion.map(WallMotion::validated).transpose()?;
         Ok(())
     }
 
-    /// Sets the layers of a sensor: it senses marbles whose layers interact with these.
+    /// Sets the layers of a sensor: it senses marbles and bodies whose layers interact with these.
     ///
     /// # Errors
     /// [`Error::NoSuchSensor`].
     pub fn set_layers(&mut self, id: SensorId, layers: CollisionLayers) -> Result<(), Error> {
         let row = self.row(id)?;
-        self.rows[row].layers = layers;
+        self.rows[row].space.layers = layers;
         Ok(())
     }
 
@@ -135,7 +137,15 @@ impl<S: Scalar> Sensors<S> {
     /// # Errors
     /// [`Error::NoSuchSensor`].
     pub fn inside(&self, id: SensorId) -> Result<&[MarbleId], Error> {
-        self.row(id).map(|row| self.rows[row].inside.as_slice())
+        self.row(id).map(|row| self.rows[row].marbles.as_slice())
+    }
+
+    /// Bodies inside of a sensor at the end of the last step, sorted.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchSensor`].
+    pub fn bodies_inside(&self, id: SensorId) -> Result<&[BodyId], Error> {
+        self.row(id).map(|row| self.rows[row].bodies.as_slice())
     }
 
     /// Balls of the swarm inside of a sensor at the end of the last step, sorted. One that passes through
@@ -152,11 +162,11 @@ impl<S: Scalar> Sensors<S> {
     /// # Errors
     /// [`Error::NoSuchSensor`].
     pub fn shape(&self, id: SensorId) -> Result<&WallShape<S>, Error> {
-        self.row(id).map(|row| &self.rows[row].shape)
+        self.row(id).map(|row| &self.rows[row].space.shape)
     }
 
-    /// Marbles that entered and left in the last step, in the order of substeps, sensors and marbles. One
-    /// that passed through within a substep enters first.
+    /// Marbles and bodies that entered and left in the last step, in the order of substeps and sensors, marbles
+    /// before bodies. One that passed through within a substep enters first.
     #[must_use]
     pub fn events(&self) -> &[SensorEvent<S>] {
         &self.events
@@ -183,12 +193,13 @@ impl<S: Scalar> Sensors<S> {
         self.events.clear();
     }
 
-    /// Stores the positions of marbles at the beginning of a substep.
-    pub(super) fn begin_substep(&mut self, marbles: &Marbles<S>) {
-        self.start.clear();
+    /// Stores where marbles and bodies are at the beginning of a substep.
+    pub(super) fn begin_substep(&mut self, marbles: &Marbles<S>, bodies: &Bodies<S>) {
+        self.marble_start.clear();
+        self.body_start.clear();
         if !self.rows.is_empty() {
-            self.start.extend_from_slice(marbles.position());
-            self.removals = marbles.removals();
+            self.marble_start.store(marbles);
+            self.body_start.store(bodies);
         }
     }
 }
@@ -197,54 +208,21 @@ impl<S: Scalar> World<S> {
     /// Updates sensors after a substep of `dt` seconds.
     pub(super) fn update_sensors(&mut self, dt: S) {
         let rest = self.scratch.rest_of_step;
-        let Sensors { handles, rows, events, start, removals } = &mut self.sensors;
-        if *removals != self.marbles.removals() {
-            start.clear(); // indices have other marbles now
-        }
+        let Sensors { handles, rows, events, marble_start, body_start } = &mut self.sensors;
+        marble_start.clear_stale(&self.marbles);
+        body_start.clear_stale(&self.bodies);
         for (row, sensor) in rows.iter_mut().enumerate() {
             let Some(id) = handles.handle(row).map(SensorId) else { continue };
-            let first = events.len();
-            let mut push_event = |marble: MarbleId, entered: bool, fraction: S| {
+            let Sensor { space, marbles, bodies, .. } = sensor;
+            let mut tell = |collider: ColliderId, entered: bool, fraction: S| {
                 let time_left = rest + dt * (S::one() - fraction).max(S::zero());
-                events.push(SensorEvent { sensor: id, marble, entered, time_left });
+                events.push(SensorEvent { sensor: id, collider, entered, time_left });
             };
-            let before = std::mem::take(&mut sensor.inside);
-            for (marble, path) in paths(&self.marbles, start, sensor, [rest, dt]) {
-                let was_inside = before.binary_search(&marble).is_ok();
-                let is_inside = sensor.shape.overlaps(&path.end);
-                let enters = || sensor.shape.cast_shape(&path.start(), path.displacement);
-                let leaves = || {
-                    let back = sensor.shape.cast_shape(&path.end, -path.displacement);
-                    back.map(|back| S::one() - back)
-                };
-                match (was_inside, is_inside) {
-                    (true, true) => {}
-                    // Who was put inside is there from the beginning.
-                    (false, true) => push_event(marble, true, enters().unwrap_or(S::zero())),
-                    (true, false) => push_event(marble, false, leaves().unwrap_or(S::zero())),
-                    // Who only reaches the surface does not leave it again.
-                    (false, false) => {
-                        if let Some(entry) = enters()
-                            && let Some(exit) = leaves().filter(|exit| *exit > entry)
-                        {
-                            push_event(marble, true, entry);
-                            push_event(marble, false, exit);
-                        }
-                    }
-                }
-                if is_inside {
-                    sensor.inside.push(marble);
-                }
-            }
-            sensor.inside.sort_unstable();
-            for marble in before.into_iter().filter(|it| sensor.inside.binary_search(it).is_err()) {
-                if !events[first..].iter().any(|event| event.marble == marble) {
-                    let time_left = rest + dt; // it was put elsewhere, or is gone
-                    events.push(SensorEvent { sensor: id, marble, entered: false, time_left });
-                }
-            }
+            sense(space, (&self.marbles, marble_start), marbles, [rest, dt], &mut tell);
+            sense(space, (&self.bodies, body_start), bodies, [rest, dt], &mut tell);
         }
-        start.clear();
+        marble_start.clear();
+        body_start.clear();
     }
 }
 
@@ -269,7 +247,7 @@ impl<S: Scalar> World<S> {
         let blocks: Vec<_> = blocks.map(bounds).collect();
         for sensor in &mut self.sensors.rows {
             sensor.balls.clear();
-            let reach = sensor.shape.bounding_box();
+            let reach = sensor.space.shape.bounding_box();
             let is_near = |bounds: &Aabb3<S>| reach.is_none_or(|reach| reach.overlaps(bounds));
             let near =
                 (0..).zip(&blocks).filter(|(_, bounds)| bounds.as_ref().is_some_and(is_near));
@@ -279,8 +257,8 @@ impl<S: Scalar> World<S> {
                 if is_near(&ball.bounds())
                     && swarm
                         .layers_of_own_row(row)
-                        .is_some_and(|it| it.interacts_with(sensor.layers))
-                    && sensor.shape.overlaps(&Shape::Sphere(ball))
+                        .is_some_and(|it| it.interacts_with(sensor.space.layers))
+                    && sensor.space.shape.overlaps(&Shape::Sphere(ball))
                 {
                     sensor.balls.extend(swarm.id(row));
                 }
@@ -288,63 +266,4 @@ impl<S: Scalar> World<S> {
             sensor.balls.sort_unstable();
         }
     }
-}
-
-/// Path of a marble in a substep, in the frame of a sensor: that of the world at the end of the step.
-struct SensedPath<S> {
-    /// The marble at its end.
-    end: Shape<S>,
-    /// In metres.
-    displacement: Vec3<S>,
-}
-
-impl<S: Scalar> SensedPath<S> {
-    /// The marble at its beginning.
-    fn start(&self) -> Shape<S> {
-        self.end.transformed(Pose { rotation: Quat::one(), translation: -self.displacement })
-    }
-}
-
-/// Marbles whose paths may touch a sensor, in a substep of `dt` seconds, `rest` seconds before the end
-/// of the step.
-fn paths<'a, S: Scalar>(
-    marbles: &'a Marbles<S>,
-    start: &'a [Point3<S>],
-    sensor: &Sensor<S>,
-    [rest, dt]: [S; 2],
-) -> impl Iterator<Item = (MarbleId, SensedPath<S>)> + use<'a, S> {
-    let (bounds, layers) = (sensor.shape.bounding_box(), sensor.layers);
-    let frame = |time: S| sensor.motion.map(|motion| motion.pose_before(time).inverse());
-    let [at_start, at_end] = [frame(rest + dt), frame(rest)];
-    (0..marbles.len()).filter_map(move |row| {
-        if !marbles.layers_of_row(row).interacts_with(layers) {
-            return None;
-        }
-        let to = marbles.position()[row];
-        let moved = start.get(row).map_or_else(Vec3::zero, |from| to - from);
-        let from = to - marbles.period.minimum_image(moved);
-        let place = |frame: Option<Pose<S>>, point: Point3<S>| {
-            frame.map_or(point, |frame| frame.transform_point(point))
-        };
-        let (from, to) = (place(at_start, from), place(at_end, to));
-        let reach = marbles.radius()[row] + marbles.half_length(row);
-        if bounds.is_some_and(|bounds| !swept_sphere_overlaps([from, to], reach, &bounds)) {
-            return None;
-        }
-        let shape = marbles.shape_of_row(row);
-        let end = at_end.map_or_else(|| shape.clone(), |frame| shape.transformed(frame));
-        Some((marbles.id(row)?, SensedPath { end, displacement: to - from }))
-    })
-}
-
-/// Tests if the box around the path of a sphere overlaps another one.
-fn swept_sphere_overlaps<S: Scalar>(
-    [from, to]: [Point3<S>; 2],
-    radius: S,
-    bounds: &Aabb3<S>,
-) -> bool {
-    (0..3).all(|axis| {
-        from[axis].min(to[axis]) - radius <= bounds.max[axis]
-            && from[axis].max(to[axis]) + radius >= bounds.min[axis]
-    })
 }

@@ -60,7 +60,7 @@ impl<S: Scalar> World<S> {
         self.find_ignored_rows();
         let held = self.marbles.held();
         self.marbles.hold(&held); // somebody may have set velocities
-        self.sensors.begin_substep(&self.marbles);
+        self.sensors.begin_substep(&self.marbles, &self.bodies);
         self.audit_before();
         self.wake_changed();
         self.wake_pulled();

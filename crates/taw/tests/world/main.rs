@@ -1,9 +1,13 @@
 //! Tests in one program, since each program compiles the core anew.
 
+#[path = "../common/any_body.rs"]
+mod any_body;
 #[path = "../common/draw.rs"]
 mod draw;
 
 mod apply;
+mod body_queries;
+mod body_sensors;
 mod conveyors;
 mod equality;
 mod ignored;

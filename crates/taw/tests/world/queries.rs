@@ -61,6 +61,7 @@ fn distance(world: &World<f64>, thing: ColliderId, point: Point3<f64>) -> f64 {
             (point - marble.position).magnitude() - marble.radius
         }
         ColliderId::Wall(id) => world.walls.get(id).unwrap().project_point(point).distance,
+        ColliderId::Body(id) => panic!("{id:?} is not there"),
     }
 }
 

@@ -68,7 +68,7 @@ fn nothing_passes_unnoticed_at_any_speed() {
             for step in 1..=steps {
                 world.step(S::from_f64(dt)).unwrap();
                 for event in world.sensors.events() {
-                    assert_eq!((event.sensor, event.marble), (gate, id));
+                    assert_eq!((event.sensor, event.collider), (gate, id.into()));
                     let time = f64::from(step) * dt - event.time_left.as_f64();
                     told.push((event.entered, time));
                 }
@@ -127,9 +127,10 @@ fn inside_are_those_that_overlap_and_events_are_the_changes() {
             for event in world.sensors.events() {
                 let gate = gates.iter().position(|gate| *gate == event.sensor).unwrap();
                 let known: &mut Vec<MarbleId> = &mut inside[gate];
-                let at = known.binary_search(&event.marble);
+                let ColliderId::Marble(marble) = event.collider else { panic!("{event:?}") };
+                let at = known.binary_search(&marble);
                 match (event.entered, at) {
-                    (true, Err(at)) => known.insert(at, event.marble),
+                    (true, Err(at)) => known.insert(at, marble),
                     (false, Ok(at)) => drop(known.remove(at)),
                     _ => panic!("{response:?}: {event:?} of {known:?}"),
                 }
@@ -174,13 +175,13 @@ fn a_sensor_that_moves_sweeps() {
                 world.step(dt).unwrap();
                 let time = |left: f64| f64::from(step) * dt - left;
                 let events = world.sensors.events().iter();
-                told.extend(events.map(|it| (it.marble, it.entered, time(it.time_left))));
+                told.extend(events.map(|it| (it.collider, it.entered, time(it.time_left))));
             }
             let case = format!("{response:?}, {substeps}, {radius}: {told:?}");
             let [(first, true, enters), (second, false, leaves)] = told[..] else {
                 panic!("{case}")
             };
-            assert_eq!((first, second), (id, id), "{case}");
+            assert_eq!((first, second), (id.into(), id.into()), "{case}");
             assert!((enters - (2.99 - radius) / speed).abs() < 1e-7, "{case}");
             assert!((leaves - (3.0 + radius) / speed).abs() < 1e-7, "{case}");
         }
@@ -215,7 +216,7 @@ fn a_paddle_that_turns_misses_nobody() {
             world.step(dt).unwrap();
             for event in world.sensors.events() {
                 if event.entered {
-                    entered.push(event.marble);
+                    entered.push(event.collider);
                 } else {
                     left += 1;
                 }
@@ -241,19 +242,19 @@ fn layers_removals_and_jumps() {
     world.sensors.set_layers(gate, CollisionLayers::new(u32::MAX, 1)).unwrap();
     let step = |world: &mut World<f32>| {
         world.step(1.0 / 64.0).unwrap();
-        world.sensors.events().iter().map(|it| (it.marble, it.entered)).collect::<Vec<_>>()
+        world.sensors.events().iter().map(|it| (it.collider, it.entered)).collect::<Vec<_>>()
     };
-    assert_eq!(step(&mut world), [(seen, true)]);
+    assert_eq!(step(&mut world), [(seen.into(), true)]);
     assert_eq!(step(&mut world), []);
     world.sensors.set_layers(gate, CollisionLayers::ALL).unwrap();
-    assert_eq!(step(&mut world), [(unseen, true)]);
+    assert_eq!(step(&mut world), [(unseen.into(), true)]);
     // A jump across touches nothing on the way.
     world.marbles.set_position(seen, point(3.0, 0.0, 0.0)).unwrap();
-    assert_eq!(step(&mut world), [(seen, false)]);
+    assert_eq!(step(&mut world), [(seen.into(), false)]);
     world.marbles.set_position(seen, point(-3.0, 0.0, 0.0)).unwrap();
     assert_eq!(step(&mut world), []);
     world.marbles.remove(unseen).unwrap();
-    assert_eq!(step(&mut world), [(unseen, false)]);
+    assert_eq!(step(&mut world), [(unseen.into(), false)]);
     assert_eq!(world.sensors.inside(gate).unwrap(), []);
     world.sensors.remove(gate).unwrap();
     assert_eq!(world.sensors.inside(gate), Err(taw::Error::NoSuchSensor(gate)));
