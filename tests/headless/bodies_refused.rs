@@ -56,13 +56,8 @@ fn what_does_nothing_on_a_body_is_named() {
     let idle = (idle, SurfaceVelocity::default(), OneWay::default());
     app.world_mut().entity_mut(body).insert(idle);
     app.update();
-    let expected = [
-        "LockedAxes",
-        "ColliderDisabled",
-        "IgnoreCollisions",
-        "SurfaceVelocity",
-        "OneWay",
-    ];
+    let expected =
+        ["LockedAxes", "ColliderDisabled", "IgnoreCollisions", "SurfaceVelocity", "OneWay"];
     assert_eq!(ignored(&app), expected.map(|name| format!("{name} of a body")));
 }
 

@@ -143,7 +143,8 @@ fn a_marble_jumps_off_a_body() {
     scene::frames(&mut app, 20);
     for asleep in [false, true] {
         let found = ground(&app, marble).unwrap();
-        assert_eq!((found.entity, found.normal), (raft, Vec3::Y), "asleep: {asleep}");
+        assert_eq!(found.entity, raft, "asleep: {asleep}");
+        assert!(found.normal.distance(Vec3::Y) < 1e-4, "{found:?}");
         assert!((found.point.y - 0.2).abs() < 1e-3, "{found:?}");
         assert_eq!(app.world().entity(marble).contains::<Sleeping>(), asleep);
         scene::frames(&mut app, 4 * 64);

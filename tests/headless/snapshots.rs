@@ -183,10 +183,10 @@ fn who_is_in_a_sensor_of_a_restored_world_is_told() {
         app.world_mut().resource_mut::<TawWorld>().restore(&saved);
         app.update();
         let messages = app.world().resource::<Messages<SensorEntered>>();
-        let told: Vec<_> = messages.iter_current_update_messages().map(|it| it.marble).collect();
+        let told: Vec<_> = messages.iter_current_update_messages().map(|it| it.collider).collect();
         assert_eq!(told, entered);
         let messages = app.world().resource::<Messages<SensorLeft>>();
-        let told: Vec<_> = messages.iter_current_update_messages().map(|it| it.marble).collect();
+        let told: Vec<_> = messages.iter_current_update_messages().map(|it| it.collider).collect();
         assert_eq!(told, left);
         assert_eq!(there(&app), sorted([goes, stays]));
         scene::frames(&mut app, 3);
