@@ -2,7 +2,7 @@
 
 use super::World;
 use crate::body::{BodyContact, BodyContactInfo, BodyContactPoint, BodyPartner, ContactPartner};
-use crate::handle::{BallId, MarbleId};
+use crate::handle::BallId;
 use crate::math::{Point3, Scalar, cast_point, cast_vector};
 use cgmath::EuclideanSpace;
 
@@ -45,10 +45,7 @@ impl<S: Scalar> World<S> {
         let partner = match contact.key.partner {
             BodyPartner::Body(id) => ContactPartner::Body(id),
             BodyPartner::Wall(id) => ContactPartner::Wall(id),
-            BodyPartner::Ball(id) => match self.marble_of_ball(id)? {
-                Some(marble) => ContactPartner::Marble(marble),
-                None => ContactPartner::Ball(id),
-            },
+            BodyPartner::Ball(id) => self.partner_of_ball(id)?,
         };
         let body = contact.key.body;
         let center = self.bodies.states[self.bodies.row(body).ok()?].solver.pose.translation;
@@ -69,17 +66,18 @@ impl<S: Scalar> World<S> {
         })
     }
 
-    /// Marble that a ball is, if it is one; none if there is no such ball any more.
-    fn marble_of_ball(&self, ball: BallId) -> Option<Option<MarbleId>> {
+    /// Ball or the marble that it is; none if it is gone.
+    fn partner_of_ball(&self, ball: BallId) -> Option<ContactPartner> {
         let row = self.swarm.row(ball).ok()?;
         if !self.swarm.is_marble(row) {
-            return Some(None);
+            return Some(ContactPartner::Ball(ball));
         }
         let slot = self.swarm.slot_of(ball)?;
         let row = *self.scratch.soft_step.marble_of_slot.get(slot as usize)?;
         let marble = self.marbles.id(row as usize)?;
         // Marbles may have come and gone since the step.
         let known = self.swarm.body_balls.binary_search_by_key(&marble, |(marble, _)| *marble);
-        known.is_ok_and(|at| self.swarm.body_balls[at].1 == ball).then_some(Some(marble))
+        let is_known = known.is_ok_and(|at| self.swarm.body_balls[at].1 == ball);
+        is_known.then_some(ContactPartner::Marble(marble))
     }
 }

@@ -1,5 +1,6 @@
 //! Rigid bodies against what mechanics says of them.
 
+mod asleep;
 mod balls;
 mod flight;
 mod joined;

@@ -10,11 +10,11 @@ pub struct Scene {
     pub half: f64,
 }
 
-fn unit(random: &mut fastrand::Rng, low: f64, high: f64) -> f64 {
+pub fn unit(random: &mut fastrand::Rng, low: f64, high: f64) -> f64 {
     low + (high - low) * random.f64()
 }
 
-fn any_shape(random: &mut fastrand::Rng) -> Shape<f32> {
+pub fn any_shape(random: &mut fastrand::Rng) -> Shape<f32> {
     let size = unit(random, 0.05, 0.25);
     let mut part = || {
         let mut number = || (unit(random, 0.3, 1.0) * size) as f32;
