@@ -274,7 +274,7 @@ fn a_hinge_driven_to_an_angle_tells_it() {
     assert!(drawn < 1e-3, "{drawn}");
 }
 
-/// What is written to a child while an ancestor has no `Transform` counts once it has one.
+/// A write to a child whose ancestor has no `Transform` counts once that has one.
 #[test]
 fn a_child_body_goes_where_it_was_written_once_it_has_a_place() {
     let mut app = app();

@@ -190,3 +190,43 @@ fn a_wall_its_mesh_and_the_wall_of_that_are_one_shape() {
         }
     }
 }
+
+/// Rays meet a compound body where they meet the mesh by which it is drawn.
+#[test]
+fn a_body_and_its_mesh_are_one_shape() {
+    use bevy_taw::body::BodyShape;
+    let number = |i: u64| random(77_000 + i);
+    let corner = |i: u64| Vec3::new(number(3 * i), number(3 * i + 1), number(3 * i + 2));
+    let hull = BodyShape::Hull((0..12).map(corner).collect());
+    let turn = Quat::from_euler(EulerRot::XYZ, 0.3, 1.0, -0.4);
+    let body = Body::from(Cuboid::new(0.4, 0.9, 1.6)).with_part(hull, Vec3::X * 0.3, turn);
+    let wall = Wall::from_mesh(&body.to_mesh().unwrap()).unwrap();
+    let place = Transform::from_xyz(0.1, 0.2, 0.3).with_rotation(turn.inverse());
+    let heights = |is_body: bool| {
+        let mut app = app();
+        app.insert_resource(TawModel(Model::GAME)).insert_resource(Gravity(Vec3::ZERO));
+        if is_body {
+            app.world_mut().spawn((body.clone(), place));
+        } else {
+            app.world_mut().spawn((wall.clone(), place));
+        }
+        app.update();
+        let cast = move |spatial: SpatialQuery| {
+            let height = |at: u64| {
+                let [x, z] = [number(900 + 2 * at), number(901 + 2 * at)].map(|it| it * 2.0 - 1.0);
+                let ray = Ray3d::new(Vec3::new(x, 5.0, z), Dir3::NEG_Y);
+                spatial.cast_ray(ray, 20.0, &SpatialQueryFilter::default()).map(|hit| hit.distance)
+            };
+            (0..200).map(height).collect::<Vec<_>>()
+        };
+        bevy::ecs::system::RunSystemOnce::run_system_once(app.world_mut(), cast).unwrap()
+    };
+    let (first, second) = (heights(true), heights(false));
+    assert!(first.iter().flatten().count() > 20);
+    for (a, b) in first.iter().zip(&second) {
+        assert_eq!(a.is_some(), b.is_some());
+        assert!(a.zip(*b).is_none_or(|(a, b)| (a - b).abs() < 1e-4), "{a:?} and {b:?}");
+    }
+    assert!(Body { parts: Vec::new() }.to_mesh().is_none());
+    assert!(Body::from(Capsule3d::default()).to_mesh().is_some());
+}

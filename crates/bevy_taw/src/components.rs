@@ -84,9 +84,11 @@ impl Default for GravityScale {
     }
 }
 
-/// Surface material of a marble or a wall. A wall without
-/// one leaves it to the marble; else both count, as [`combine`](Self::combine) says. The
+/// Surface material of a marble, a body or a wall. A wall without
+/// one leaves it to what touches it; else both count, as [`combine`](Self::combine) says. The
 /// response [`Displacement`](taw::response::Response::Displacement) does not read it.
+///
+/// By default, and of marbles and bodies without one: restitution 0.5, friction 0.3, nothing that resists rolling.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct SurfaceMaterial {

@@ -182,8 +182,11 @@ fn draw<T: Placed>(
     {
         // Who crossed a side of a periodic box did not come from the other one.
         let start = from_point(world.nearest_image(to_point(*start), to_point(position)));
-        position = start.lerp(position, part);
-        rotation = rotation.map(|end| turned.map_or(end, |start| start.slerp(end, part)));
+        position = start + (position - start) * part; // with the bits of both where they are one
+        rotation = rotation.map(|end| {
+            let turned = turned.filter(|start| *start != end);
+            turned.map_or(end, |start| start.slerp(end, part))
+        });
     }
     let (seen, turned) = state.seen();
     let moved = bits(transform.translation) != seen;

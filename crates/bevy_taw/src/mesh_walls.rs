@@ -6,6 +6,7 @@ use bevy::mesh::{Indices, MeshTrianglesError, PrimitiveTopology};
 use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 
+use crate::body::{Body, BodyPart, BodyShape};
 use crate::components::Marble;
 use crate::convert::{from_point, to_point};
 use crate::wall::Wall;
@@ -141,6 +142,29 @@ impl Wall {
                 flat(landscape(*cell, *columns, heights))?
             }
         })
+    }
+}
+
+impl Body {
+    /// The body as a mesh, to draw it. `None` for a hull that cannot be one, or without parts.
+    #[must_use]
+    pub fn to_mesh(&self) -> Option<Mesh> {
+        let mut parts = self.parts.iter().map(|part| {
+            let BodyPart { translation, rotation, .. } = *part;
+            let shape = match part.shape.clone() {
+                BodyShape::Sphere(sphere) => Wall::Sphere(sphere),
+                BodyShape::Cuboid(cuboid) => Wall::Cuboid(cuboid),
+                BodyShape::Capsule(capsule) => Wall::Capsule(capsule),
+                BodyShape::Hull(points) => Wall::Hull(points),
+            };
+            let place = Transform { translation, rotation, ..default() };
+            Some(shape.to_mesh()?.transformed_by(place))
+        });
+        let mut mesh = parts.next()??;
+        for part in parts {
+            mesh.merge(&part?).ok()?;
+        }
+        Some(mesh)
     }
 }
 

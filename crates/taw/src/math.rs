@@ -104,6 +104,11 @@ impl Scalar for f64 {
     }
 }
 
+/// Converts a quaternion to another scalar.
+pub(crate) fn cast_rotation<S: Scalar, T: Scalar>(Quat { s, v }: Quat<S>) -> Quat<T> {
+    Quat { s: T::from_f64(s.as_f64()), v: cast_vector(v) }
+}
+
 /// Converts a vector to another scalar.
 #[must_use]
 #[inline]

@@ -9,7 +9,7 @@ use super::state::SolverBody;
 use crate::Error;
 use crate::contact::{Convex, as_convex};
 use crate::frame::Pose;
-use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector};
+use crate::math::{Point3, Scalar, Vec3, cast_rotation, cast_vector};
 use crate::motion::rest;
 use crate::shape::{Aabb3, BoundedShape, Shape};
 
@@ -177,8 +177,4 @@ fn reach_of(shape: &Shape<f64>) -> f64 {
         return ball.center.to_vec().magnitude() + ball.radius;
     }
     shape.bounding_box().farthest_distance(Point3::origin())
-}
-
-pub(super) fn cast_rotation<S: Scalar, T: Scalar>(Quat { s, v }: Quat<S>) -> Quat<T> {
-    Quat { s: T::from_f64(s.as_f64()), v: cast_vector(v) }
 }

@@ -2,14 +2,14 @@
 
 use cgmath::{EuclideanSpace, Zero};
 
-use super::body_state::{BodyState, cast_rotation};
+use super::body_state::BodyState;
 use super::contact::{BodyContact, BodyPartner};
 use super::{Body, BodyId};
 use crate::Error;
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Pose;
 use crate::handle::{BallId, Handles};
-use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector};
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_rotation, cast_vector};
 use crate::shape::{Aabb3, MassProperties};
 
 /// Place and motion of a body.

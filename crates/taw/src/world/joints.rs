@@ -11,7 +11,7 @@ use crate::Error;
 use crate::frame::Pose;
 use crate::handle::BodyId;
 use crate::joint::{JointBody, JointEnd, JointOwner, JointSystem, Joints, SystemJoint};
-use crate::math::{Quat, Scalar, Vec3, cast_vector, normalize_and_length};
+use crate::math::{Scalar, Vec3, cast_rotation, cast_vector, normalize_and_length};
 use crate::motion::{BALL_INVERSE_INERTIA, Rotation};
 
 /// Bodies of the joints, while the joints and what they join stay the same.
@@ -263,10 +263,6 @@ fn moving_place(from: Pose<f64>, to: Pose<f64>, dt: f64) -> JointBody {
         .map_or_else(Vec3::zero, |(axis, sine)| axis * (2.0 * sine.atan2_portable(turn.s) / dt));
     let velocity = (to.translation - from.translation) / dt;
     JointBody { velocity, spin, ..JointBody::place(from) }
-}
-
-fn cast_rotation<S: Scalar, T: Scalar>(Quat { s, v }: Quat<S>) -> Quat<T> {
-    Quat { s: T::from_f64(s.as_f64()), v: cast_vector(v) }
 }
 
 fn cast_pose<S: Scalar>(pose: Pose<S>) -> Pose<f64> {
