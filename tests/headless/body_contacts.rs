@@ -84,6 +84,10 @@ fn contacts_of_bodies_start_go_on_and_end() {
     assert_eq!(of_pair(&app, lower, upper), [('e', 0.0)]);
 }
 
+/// Hits: the observed entity, the other one, and the impulse on the first.
+#[derive(Resource, Default)]
+struct Seen(Vec<(Entity, Entity, Vec3)>);
+
 /// A marble that hits a crate is told once with its impulse, to observers of both, from the side of each.
 #[test]
 fn a_hit_on_a_body_is_told_to_both() {
@@ -95,8 +99,6 @@ fn a_hit_on_a_body_is_told_to_both() {
     let marble = scene::drop_marble(&mut app, 0.1, Vec3::new(-2.0, 2.0, 0.0));
     let flight = (Velocity(Vec3::X * 8.0), MarbleMass::Kilograms(1.0), elastic);
     app.world_mut().entity_mut(marble).insert(flight);
-    #[derive(Resource, Default)]
-    struct Seen(Vec<(Entity, Entity, Vec3)>);
     app.init_resource::<Seen>();
     for entity in [target, marble] {
         app.world_mut().entity_mut(entity).observe(
