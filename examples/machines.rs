@@ -8,7 +8,6 @@
 #[path = "games/paint.rs"]
 mod paint;
 
-use std::f32::consts::FRAC_PI_2;
 use std::time::Duration;
 
 use bevy::color::palettes::tailwind;
@@ -25,11 +24,9 @@ use taw_examples::{ExamplePlugins, Picture};
 const RADIUS: f32 = 0.12;
 /// From front to back, of most parts. Two panes of glass are 10 cm farther apart.
 const DEPTH: f32 = 0.5;
-pub(crate) const DOMINOES: usize = 7;
 pub(crate) const LINKS: usize = 8;
 /// Distance of the hinges of a link, in metres.
 pub(crate) const LINK: f32 = 0.22;
-/// Ends of the bridge.
 pub(crate) const BRIDGE: [Vec3; 2] = [Vec3::new(-1.9, 2.55, 0.0), Vec3::new(-0.3, 1.95, 0.0)];
 
 #[derive(Parser)]
@@ -51,18 +48,13 @@ pub(crate) enum Part {
     Joint,
 }
 
-/// The slider of the launcher.
-#[derive(Component)]
-struct Launcher;
-
 /// Marbles dropped, and hinges broken.
 #[derive(Resource, Default)]
 pub(crate) struct Tally(pub(crate) u32, pub(crate) u32);
 
 fn main() -> AppExit {
-    let picture = Options::parse().picture;
     App::new()
-        .add_plugins(ExamplePlugins { title: "Machines", picture })
+        .add_plugins(ExamplePlugins { title: "Machines", picture: Options::parse().picture })
         .add_plugins((EguiPlugin::default(), TawPlugins, plugin))
         .add_systems(EguiPrimaryContextPass, panel)
         .run()
@@ -97,8 +89,7 @@ impl Workshop<'_, '_> {
 
     /// Wooden body of boxes: of each, its size and place.
     fn body(&mut self, part: Part, at: Vec3, boxes: &[(Vec3, Vec3)], colour: Srgba) -> Entity {
-        let mut body = Body { parts: Vec::new() };
-        let mut drawn = Vec::new();
+        let (mut body, mut drawn) = (Body { parts: Vec::new() }, Vec::new());
         for &(size, at) in boxes {
             let shape = Cuboid::from_size(size);
             body = body.with_part(BodyShape::Cuboid(shape), at, Quat::IDENTITY);
@@ -117,8 +108,8 @@ impl Workshop<'_, '_> {
         self.commands.spawn((Marble::new(RADIUS), wood, surface, drawn));
     }
 
-    fn joint(&mut self, joint: Joint) -> EntityCommands<'_> {
-        self.commands.spawn((Part::Joint, joint))
+    fn joint(&mut self, joint: Joint) {
+        self.commands.spawn((Part::Joint, joint));
     }
 }
 
@@ -145,7 +136,7 @@ fn stage(mut shop: Workshop) {
         shop.commands.spawn((Wall::HalfSpace(normal), Transform::from_xyz(0.0, 0.0, z)));
     }
     shop.bar(at(0.0, -0.04), 9.0, 0.0);
-    shop.bar(at(-4.1, 3.3), 0.7, FRAC_PI_2);
+    shop.bar(at(-4.1, 3.3), 0.7, 1.6);
     shop.bar(at(-3.0, 2.8), 2.2, -0.2);
     shop.bar(at(1.25, 1.0), 0.7, -0.2);
     shop.bar(at(-2.4, 0.86), 3.4, 0.0);
@@ -169,8 +160,7 @@ fn wheel_and_gate(mut shop: Workshop) {
     let wheel = shop.body(Part::Wheel, hub, &paddles, tailwind::AMBER_500);
     shop.joint(hinge(hub, wheel, Vec3::ZERO, None));
     // Hangs down, and opens to the right only.
-    let (top, up) = (at(-2.15, 3.15), Vec3::Y * 0.2);
-    let board = (plank(0.03, 0.4), Vec3::ZERO);
+    let (top, up, board) = (at(-2.15, 3.15), Vec3::Y * 0.2, (plank(0.03, 0.4), Vec3::ZERO));
     let gate = shop.body(Part::Gate, top - up, &[board], tailwind::ROSE_500);
     shop.joint(hinge(top, gate, up, Some([0.0, 1.5])));
 }
@@ -180,11 +170,10 @@ fn bridge(mut shop: Workshop) {
     let ([first, last], reach) = (BRIDGE, Vec3::X * LINK / 2.0);
     let slope = Quat::from_rotation_arc(Vec3::X, (last - first).normalize());
     let fold = (first.distance(last) / (LINKS as f32 * LINK)).acos();
-    let hinge = JointKind::Hinge(JointDrive::default());
+    let (hinge, board) = (JointKind::Hinge(default()), (plank(LINK - 0.03, 0.05), Vec3::ZERO));
     let (mut place, mut before) = (first, JointEnd::world(first));
     for i in 0..LINKS {
         let turn = slope * Quat::from_rotation_z(if i % 2 == 0 { -fold } else { fold });
-        let board = (plank(LINK - 0.03, 0.05), Vec3::ZERO);
         let link = shop.body(Part::Link, place, &[board], tailwind::ORANGE_300);
         let middle = Transform::from_translation(place + turn * reach).with_rotation(turn);
         let damping = MarbleDamping { linear: 1.0, angular: 1.0 };
@@ -219,7 +208,7 @@ fn launcher(mut shop: Workshop) {
     let (place, boxes) = (at(-3.85, 1.02), [(Vec3::new(0.3, 0.2, 0.4), Vec3::ZERO)]);
     let plunger = shop.body(Part::Plunger, place, &boxes, tailwind::VIOLET_400);
     let (first, second) = (JointEnd::world(place), JointEnd::on(plunger, Vec3::ZERO));
-    shop.joint(Joint::new(slider(0.0), first, second)).insert(Launcher);
+    shop.joint(Joint::new(slider(0.0), first, second));
     shop.marble(at(-3.5, 0.9 + RADIUS), tailwind::SLATE_100);
 }
 
@@ -231,7 +220,7 @@ fn slider(target: f32) -> JointKind {
 
 fn dominoes(mut shop: Workshop) {
     let boxes = [(Vec3::new(0.06, 0.4, 0.3), Vec3::ZERO)];
-    for i in 0..DOMINOES {
+    for i in 0..7 {
         shop.body(Part::Domino, at(-2.6 + 0.2 * i as f32, 1.1), &boxes, tailwind::RED_500);
     }
 }
@@ -241,17 +230,16 @@ fn drop_marble(mut shop: Workshop, mut tally: ResMut<Tally>) {
     tally.0 += 1;
 }
 
-fn launch(keys: Res<ButtonInput<KeyCode>>, mut launcher: Single<&mut Joint, With<Launcher>>) {
+fn launch(keys: Res<ButtonInput<KeyCode>>, mut joints: Query<&mut Joint>) {
     let kind = slider(if keys.pressed(KeyCode::Space) { 0.4 } else { 0.0 });
-    if launcher.kind != kind {
-        launcher.kind = kind;
+    for joint in joints.iter_mut().filter(|it| matches!(it.kind, JointKind::Slider(_))) {
+        joint.map_unchanged(|it| &mut it.kind).set_if_neq(kind);
     }
 }
 
 fn show(mut broken: MessageReader<JointBroken>, mut tally: ResMut<Tally>, mut said: ResMut<Said>) {
     tally.1 += broken.read().count() as u32;
-    let Tally(dropped, broken) = *tally;
-    said.0 = format!("{dropped} marbles, hinges broken: {broken}\nSpace: launch, R: build anew");
+    said.0 = format!("{} marbles, {} broken\nSpace: launch, R: build anew", tally.0, tally.1);
 }
 
 fn panel(mut contexts: EguiContexts, said: Res<Said>) -> Result {
