@@ -1,21 +1,21 @@
 //! Runs the example `machines`, and looks whether it shows what it says.
 
 #[path = "../../examples/machines.rs"]
-#[expect(dead_code, reason = "its window")]
-mod machines;
+#[allow(dead_code, clippy::duplicate_mod, reason = "its window; its paint is that of the games")]
+mod example;
 
 use std::collections::HashMap;
 use std::f32::consts::TAU;
 
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
-use machines::{LINK, LINKS, Part, Tally};
+use example::{LINK, LINKS, Part, Tally};
 
 use crate::games::play;
 use crate::scene;
 
 fn run() -> App {
-    play(machines::plugin)
+    play(example::plugin)
 }
 
 fn places(app: &mut App, part: Part) -> Vec<Transform> {
@@ -53,7 +53,7 @@ fn gap(links: &[Transform]) -> f32 {
         |pair: &[Transform]| [pair[0].transform_point(reach), pair[1].transform_point(-reach)];
     let gaps = links.windows(2).map(|pair| ends(pair)[0].distance(ends(pair)[1]));
     let [first, last] = [links[0].transform_point(-reach), links[LINKS - 1].transform_point(reach)];
-    let (first, last) = (first.distance(machines::BRIDGE[0]), last.distance(machines::BRIDGE[1]));
+    let (first, last) = (first.distance(example::BRIDGE[0]), last.distance(example::BRIDGE[1]));
     gaps.fold(first.max(last), f32::max)
 }
 
