@@ -22,7 +22,7 @@ use bevy_taw::prelude::*;
 
 use crate::scene;
 
-fn play<M>(game: impl bevy::app::Plugins<M>) -> App {
+pub fn play<M>(game: impl bevy::app::Plugins<M>) -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), MeshPlugin));
     app.init_asset::<StandardMaterial>();

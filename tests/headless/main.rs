@@ -22,6 +22,7 @@ mod joints;
 mod layers;
 mod lifts;
 mod locked_axes;
+mod machines;
 mod mesh_walls;
 mod motion;
 mod moving_walls;
