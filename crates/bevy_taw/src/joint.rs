@@ -18,8 +18,8 @@ use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
 use crate::snapshot::RowRemoved;
 
-/// Joint: an entity of its own that holds two others, or one and a place in the world. It goes when one of them does;
-/// while one is disabled, it waits.
+/// Joint: an entity of its own that holds two others, or one and a place in the world. When one of them goes, this
+/// component does, and its entity stays; while one is disabled, it waits.
 ///
 /// Hinges and wheels turn about z of the joint's frame, sliders and suspensions go along x. Joints need
 /// [`Response::SoftStep`](taw::response::Response::SoftStep), the default.
@@ -48,7 +48,8 @@ pub struct Joint {
     pub ends: [JointEnd; 2],
     /// True if the two that it holds collide with each other.
     pub collide_connected: bool,
-    /// Force in N beyond which it breaks; none for never.
+    /// Force in N beyond which it breaks, as a mean over a substep: a blow counts whole, and the shorter a substep, the
+    /// larger is its force. None for never.
     pub breaking_force: Option<f32>,
     /// Torque in N m beyond which it breaks; none for never.
     pub breaking_torque: Option<f32>,

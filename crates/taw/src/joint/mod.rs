@@ -218,8 +218,9 @@ pub struct Joint<S> {
     pub kind: JointKind<S>,
     /// True if the two that it joins collide with each other.
     pub collide_connected: bool,
-    /// Force in N beyond which it breaks; infinite for never. Anchors that are apart when the joint is made are
-    /// brought together within few substeps, by a force that may be large.
+    /// Force in N beyond which it breaks, as a mean over a substep, so that a blow counts whole; infinite for never.
+    /// Anchors that are apart when the joint is made are brought together within few substeps, by a force that may be
+    /// large.
     pub breaking_force: S,
     /// Torque in N m beyond which it breaks; infinite for never.
     pub breaking_torque: S,

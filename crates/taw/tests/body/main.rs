@@ -2,6 +2,7 @@
 
 mod asleep;
 mod balls;
+mod bridges;
 mod flight;
 mod joined;
 mod loads;
