@@ -225,7 +225,10 @@ pub(crate) fn collect_impacts(
         }
     }
     touches.impacts = world.impacts().len();
-    for (_, point) in body_touches(&world) {
+    let mut points: Vec<_> = body_touches(&world).map(|(_, point)| point).collect();
+    // The point that bears most stands for its pair.
+    points.sort_by(|a, b| b.normal_impulse.total_cmp(&a.normal_impulse));
+    for point in points {
         let bears = point.normal_impulse > 0.0;
         let slowest = if bears { fastest_rest(&world, delta.0) } else { f32::INFINITY };
         touches.add(ContactStarted::of(&point), slowest);

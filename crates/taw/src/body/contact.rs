@@ -67,6 +67,8 @@ pub(crate) struct BodyContactPoint {
     /// Largest approach speed along the normal in the step, before contacts are solved, and the speed of the slip
     /// then, in m/s.
     pub fastest: [f64; 2],
+    /// True if its contact touches, here.
+    pub touches: bool,
     /// Point on the partner's surface where contacts were found.
     pub place: Vec3<f64>,
 }
@@ -133,6 +135,7 @@ impl BodyContactPoint {
             approach: 0.0,
             total: ContactImpulse::zero(),
             fastest: [f64::NEG_INFINITY, 0.0],
+            touches: false,
             place: Vec3::zero(),
         }
     }

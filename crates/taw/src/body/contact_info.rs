@@ -31,9 +31,10 @@ pub struct BodyContactInfo<S> {
     pub normal: Vec3<S>,
     /// Point on the body's surface at the end of the step, in metres.
     pub point: Point3<S>,
-    /// Separation of the surfaces there, in metres; negative where they overlap.
+    /// Separation of the surfaces there, in metres; negative where they overlap, and infinite of a fast ball that passes
+    /// by.
     pub separation: S,
-    /// True from when the two first press on each other until a gap opens
+    /// True from when the two parts first press on each other until a gap opens here
     /// ([`touch_goes_on`](crate::contact::touch_goes_on)).
     pub is_touching: bool,
     /// Largest approach speed along the normal in the step before contacts are solved, in m/s; negative if the two

@@ -36,10 +36,11 @@ impl<S: Scalar> World<S> {
     pub(super) fn give_bodies(&mut self, dt: S) {
         self.bodies.stopped.clear();
         self.wake_at_changed_bodies();
-        self.wake_touching();
         if self.bodies.is_empty() {
+            self.keep_balls_awake();
             return;
         }
+        self.wake_touching();
         self.wake_bodies_beside_changes();
         for id in &self.scratch.soft_step.jointed.rigid {
             if let Ok(row) = self.bodies.row(*id) {
@@ -90,8 +91,7 @@ impl<S: Scalar> World<S> {
         self.update_body_sleep(&lies, dt);
     }
 
-    /// Wakes bodies that touch a ball or a body which does not rest, or touched a ball that is gone, and keeps balls
-    /// awake that touch a body which is: the two fall asleep together.
+    /// Wakes bodies that touch a ball or a body which does not rest, or touched a ball that is gone.
     fn wake_touching(&mut self) {
         let awake_balls = self.bodies.touching_balls().filter(|it| !self.swarm.rests(it.0));
         let mut touched: Vec<_> = awake_balls.map(|(_, row)| row).collect();
@@ -109,6 +109,10 @@ impl<S: Scalar> World<S> {
         for row in touched {
             self.bodies.wake_island(row); // no other but sleepers
         }
+    }
+
+    /// Keeps balls awake that touch a body which is: the two fall asleep together.
+    pub(super) fn keep_balls_awake(&mut self) {
         let (bodies, swarm) = (&self.bodies, &mut self.swarm);
         let held = bodies.touching_balls().filter(|(_, row)| !bodies.states[*row].is_still());
         swarm.hold_awake(held.map(|(ball, _)| ball));
@@ -247,7 +251,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Notes which contacts touch: from when they first bear something, until a gap opens.
+    /// Notes which contacts touch, from when they first bear something until a gap opens, and with which points.
     fn note_touches(&self, contacts: &mut [BodyContact], dt: f64) {
         let h = dt / f64::from(self.settings.model.substeps.max(1));
         let fall = cast_vector::<S, f64>(self.settings.gravity).magnitude() * h * h;
@@ -259,8 +263,12 @@ impl<S: Scalar> World<S> {
                 _ => partner, // walls are larger than bodies
             };
             let smaller = partner.into_iter().chain(body).fold(f64::INFINITY, f64::min);
-            let goes_on = touch_goes_on(contact.separation(), smaller, fall);
-            contact.touches = contact.bore() || contact.touches && goes_on;
+            let goes_on = |separation| touch_goes_on(separation, smaller, fall);
+            contact.touches = contact.bore() || contact.touches && goes_on(contact.separation());
+            for point in &mut contact.points {
+                let is_near = point.total.normal > 0.0 || goes_on(point.separation);
+                point.touches = contact.touches && is_near;
+            }
         }
     }
 
@@ -295,7 +303,7 @@ impl<S: Scalar> World<S> {
         }
         let (states, islands) = (&self.bodies.states, &mut self.scratch.bodies.islands);
         islands.reset(states.len());
-        for contact in self.bodies.contacts.iter().filter(|contact| contact.presses()) {
+        for contact in self.bodies.contacts.iter().filter(|contact| contact.touches) {
             let BodyPartner::Body(other) = contact.key.partner else { continue };
             let (Ok(a), Ok(b)) = (self.bodies.row(other), self.bodies.row(contact.key.body)) else {
                 continue;

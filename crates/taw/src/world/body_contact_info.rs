@@ -58,7 +58,7 @@ impl<S: Scalar> World<S> {
             normal: cast_vector(contact.normal),
             point: cast_point(Point3::from_vec(center + point.arms[1])),
             separation: S::from_f64(point.separation),
-            is_touching: contact.touches,
+            is_touching: point.touches,
             approach_speed,
             slip_speed,
             normal_impulse: S::from_f64(point.total.normal),

@@ -95,6 +95,7 @@ impl<S: Scalar> World<S> {
         while self.wake_disturbed_bodies(&candidates) {
             candidates = self.body_candidates(step);
         }
+        self.keep_balls_awake();
         let states = &self.bodies.states;
         let apart = self.joints.ignored_bodies();
         let mut system = BodySystem::new(
@@ -328,7 +329,7 @@ impl<S: Scalar> World<S> {
         for &NearBall { ref ball, row, way } in &candidates.balls {
             let state = &self.bodies.states[row];
             let Some(body) = self.bodies.id(row) else { continue };
-            if ball.is_asleep && state.is_still() {
+            if self.swarm.is_asleep(ball.id) && state.is_still() {
                 continue; // their contact is kept
             }
             let marble = || {

@@ -182,3 +182,70 @@ fn what_sleeps_on_balls_keeps_its_forces() {
         .sum();
     assert!((force / (100.0 * 9.81) - 1.0).abs() < 0.05, "{force} N");
 }
+
+/// A ball asleep on a thin plate is not driven into it by a crate that comes down on it.
+#[test]
+fn a_sleeper_that_is_struck_keeps_what_it_lies_on() {
+    let mut world = world::<f64>(false);
+    let plate = Body {
+        mass: BodyMass::Uniform(Mass::Infinite),
+        ..cuboid([0.5, 0.01, 0.5], point(0.0, -0.01, 0.0))
+    };
+    world.bodies.insert(plate).unwrap();
+    let marble = world.marbles.insert(Marble::new(point(0.0, 0.1, 0.0), 0.1)).unwrap();
+    run(&mut world, 3.0);
+    assert!(world.is_asleep(marble).unwrap());
+    let crate_ = Body {
+        velocity: vector(0.0, -8.0, 0.0),
+        mass: BodyMass::Uniform(Mass::Kilograms(20.0)),
+        ..cuboid([0.1, 0.1, 0.1], point(0.0, 0.31, 0.0))
+    };
+    world.bodies.insert(crate_).unwrap();
+    let mut lowest = 1.0_f64;
+    for _ in 0..30 {
+        step(&mut world);
+        lowest = lowest.min(world.marbles.get(marble).unwrap().position.y);
+    }
+    assert!(lowest > 0.09, "{lowest}");
+}
+
+/// A box that strikes a sleeper moves the ball, too, against which that sleeps.
+#[test]
+fn a_blow_goes_through_a_sleeper_to_a_ball() {
+    let mut world = world::<f64>(true);
+    let smooth = material(0.0, 0.0);
+    let of_mass = |x: f64, velocity| Body {
+        mass: BodyMass::Uniform(Mass::Kilograms(5.0)),
+        material: smooth,
+        velocity,
+        ..cuboid([0.1, 0.1, 0.1], point(x, 0.1, 0.0))
+    };
+    let still = vector(0.0, 0.0, 0.0);
+    world.bodies.insert(of_mass(0.0, still)).unwrap();
+    let marble = Marble {
+        mass: Mass::Kilograms(5.0),
+        material: Some(smooth),
+        ..Marble::new(point(0.1995, 0.1, 0.0), 0.1)
+    };
+    let marble = world.marbles.insert(marble).unwrap();
+    run(&mut world, 4.0);
+    assert!(world.is_asleep(marble).unwrap());
+    world.bodies.insert(of_mass(-0.35, vector(5.0, 0.0, 0.0))).unwrap();
+    run(&mut world, 0.2);
+    let momentum: f64 = world.bodies.ids().map(|id| velocity(&world, id).x * 5.0).sum();
+    let speed = world.marbles.get(marble).unwrap().velocity.x;
+    assert!((momentum + speed * 5.0 - 25.0).abs() < 0.5, "{momentum} and {speed}");
+    assert!(speed > 1.5, "{speed} m/s");
+}
+
+/// A ball that never sleeps keeps a body awake on which it leans, and pushes it from there.
+#[test]
+fn what_never_sleeps_keeps_awake_what_it_touches() {
+    let mut world = world::<f32>(true);
+    let hero = Marble { sleeping_disabled: true, ..Marble::new(point(0.0, 0.3, 0.0), 0.1) };
+    world.marbles.insert(hero).unwrap();
+    let below = world.bodies.insert(cuboid([0.2, 0.1, 0.2], point(0.0, 0.1, 0.0))).unwrap();
+    let alone = world.bodies.insert(cuboid([0.2, 0.1, 0.2], point(2.0, 0.1, 0.0))).unwrap();
+    run(&mut world, 4.0);
+    assert_eq!([below, alone].map(|id| world.bodies.is_asleep(id).unwrap()), [false, true]);
+}

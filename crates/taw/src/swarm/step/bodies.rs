@@ -82,13 +82,15 @@ impl<S: Scalar> Swarm<S> {
         }
     }
 
-    /// Returns true if a ball sleeps, or rests and would.
+    /// Returns true if a ball sleeps, or has rested for long enough and may.
     pub(crate) fn rests(&self, ball: BallId) -> bool {
         let Ok(row) = self.row(ball) else { return false };
         let gravity = length(self.gravity.unwrap_or_else(Vec3::zero));
         let rest = &self.sleep.rest;
         self.velocity[row][3].is_sign_negative()
-            || rest.is_at_rest(row) && rest.lasts(row, self.at[row][3], gravity)
+            || !self.sleep.sleepless.contains(self.ids.slots()[row])
+                && rest.is_at_rest(row)
+                && rest.lasts(row, self.at[row][3], gravity)
     }
 
     /// Sets the rigid bodies of the next step.
