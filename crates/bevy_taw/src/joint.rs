@@ -21,8 +21,9 @@ use crate::snapshot::RowRemoved;
 /// Joint: an entity of its own that holds two others, or one and a place in the world. When one of them goes, this
 /// component does, and its entity stays; while one is disabled, it waits.
 ///
-/// In the four substeps of [`Model::GAME`](taw::world::Model::GAME), long chains that bear heavy marbles, or have brakes in their hinges,
-/// make energy or open: take sixteen, light loads, or `MarbleDamping` on the links.
+/// In the four substeps of [`Model::GAME`](taw::world::Model::GAME), long chains that bear heavy marbles, or have brakes
+/// in their hinges, make energy or open: take sixteen, light loads, or `MarbleDamping` on the links. Links that are
+/// placed on a line between ends too close for them float there: place them folded, so that their anchors meet.
 ///
 /// Hinges and wheels turn about z of the joint's frame, sliders and suspensions go along x. Joints need
 /// [`Response::SoftStep`](taw::response::Response::SoftStep), the default.

@@ -62,12 +62,12 @@ pub(crate) struct BodyContactPoint {
     pub impulse: ContactImpulse<f64>,
     /// Speed along the normal before contacts were solved in the substep, in m/s; negative of an approach.
     pub approach: f64,
-    /// Impulse of the step, in N s.
+    /// Sum of the impulses of the step, in N s.
     pub total: ContactImpulse<f64>,
     /// Largest approach speed along the normal in the step, before contacts are solved, and the speed of the slip
     /// then, in m/s.
     pub fastest: [f64; 2],
-    /// True if its contact touches, here.
+    /// True if its contact touches at this point.
     pub touches: bool,
     /// Point on the partner's surface where contacts were found.
     pub place: Vec3<f64>,

@@ -31,8 +31,9 @@ pub struct BodyPlace<S> {
 /// to step a world that has some.
 ///
 /// Bodies collide with each other, with walls, with marbles and with the balls of the swarm. They are solved on one
-/// thread. [Queries](crate::world::Queries) and [sensors](crate::world::Sensors) find them. Force fields, speed limits and the energy audit leave them out. A body that is ten times as heavy as one
-/// below it sinks in by less than a hundredth of its size, a hundred times as heavy by 7 %, and heavier ones go through.
+/// thread. [Queries](crate::world::Queries) and [sensors](crate::world::Sensors) find them. Force fields, speed limits
+/// and the energy audit leave them out. A body that is ten times as heavy as one below it sinks in by less than a
+/// hundredth of its size, a hundred times as heavy by 7 %, and heavier ones go through.
 ///
 /// ```
 /// use taw::body::Body;

@@ -12,7 +12,7 @@ pub(super) struct SleepState<S> {
     pub groups: SleepGroups,
     /// Slots of balls that never sleep, nor do their islands.
     pub sleepless: BitSet,
-    /// Slots of balls that touch a rigid body which is awake, nor do they or their islands fall asleep.
+    /// Slots of balls that touch an awake rigid body: neither they nor their islands fall asleep.
     pub held: BitSet,
     /// Slots of balls that were changed from outside since the last step.
     pub stirred: BitSet,
